@@ -1,0 +1,3 @@
+//! The standalone program.
+
+fn main() {}

@@ -1,0 +1,65 @@
+//! The one error type of the library.
+
+use std::path::{Path, PathBuf};
+
+/// What went wrong, where, and what would help. Its `Display` is one line, fit to show to a user as it is.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The operating system could not read or write a file.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// The system's answer.
+        source: std::io::Error,
+    },
+    /// A file does not hold what its format demands.
+    #[error("{}: {what}", path.display())]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and where in the file: the array, the cell, the key.
+        what: String,
+    },
+    /// A file is (or may be) right, but uses something that Halite does not read.
+    #[error("{}: {what}", path.display())]
+    Unsupported {
+        /// The file.
+        path: PathBuf,
+        /// The feature, by name, and what would help.
+        what: String,
+    },
+    /// A mesh breaks a rule that every mesh must keep.
+    #[error("the mesh is not valid: {0}")]
+    Mesh(String),
+    /// The chosen array does not exist, or cannot be drawn.
+    #[error("{0}")]
+    Field(String),
+    /// A transfer function, colour map or unit distance that cannot be used.
+    #[error("the transfer function is not valid: {0}")]
+    Transfer(String),
+    /// A camera, image size, depth buffer or clipping that cannot be used.
+    #[error("the view is not valid: {0}")]
+    View(String),
+    /// The renderer was asked for a frame before it had what it needs, or after it failed.
+    #[error("{0}")]
+    Render(String),
+}
+
+impl Error {
+    pub(crate) fn file(path: &Path, source: std::io::Error) -> Self {
+        Error::File { path: path.to_owned(), source }
+    }
+
+    pub(crate) fn malformed(path: &Path, what: impl Into<String>) -> Self {
+        Error::Malformed { path: path.to_owned(), what: what.into() }
+    }
+
+    pub(crate) fn unsupported(path: &Path, what: impl Into<String>) -> Self {
+        Error::Unsupported { path: path.to_owned(), what: what.into() }
+    }
+}
+
+/// A result of this library.
+pub type Result<T, E = Error> = std::result::Result<T, E>;

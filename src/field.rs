@@ -1,0 +1,198 @@
+//! The field that is drawn: one array of a mesh, reduced to a scalar, a (colour, opacity) pair or RGBA.
+
+use crate::error::{Error, Result};
+use crate::mesh::{Array, Mesh, Values, with_values};
+use rayon::prelude::*;
+
+/// Whether values belong to points (and vary linearly inside a tetrahedron) or to cells (and are constant inside).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Association {
+    /// One value per point.
+    Point,
+    /// One value per cell.
+    Cell,
+}
+
+/// What of an array's tuples is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Component {
+    /// One component, counted from 0.
+    Index(usize),
+    /// The Euclidean length of the tuple.
+    Magnitude,
+    /// All of them, dependent as VTK has it: two are (colour, opacity) values, four are RGBA.
+    All,
+}
+
+/// How the components of a field drive colour and opacity.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// One value drives both.
+    Scalar,
+    /// The first value drives the colour function, the second the opacity function.
+    Pair,
+    /// The first three values are the colour, in [0, 1]; the fourth drives the opacity function.
+    Rgba,
+}
+
+impl Kind {
+    /// Values per point or cell: 1, 2 or 4.
+    pub fn components(self) -> usize {
+        match self {
+            Kind::Scalar => 1,
+            Kind::Pair => 2,
+            Kind::Rgba => 4,
+        }
+    }
+}
+
+/// The affine map from a field's values to [−1, 1]: `(s − mid) / half`, computed in f64 so that nothing is lost in a
+/// field like 1e9 ± 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Normal {
+    /// The middle of the range of the finite values.
+    pub mid: f64,
+    /// Half of that range; where it is zero, a positive number.
+    pub half: f64,
+}
+
+impl Normal {
+    /// The map for values in `[lo, hi]`.
+    pub fn new(lo: f64, hi: f64) -> Self {
+        let (mid, half) = (lo / 2.0 + hi / 2.0, hi / 2.0 - lo / 2.0);
+        Normal { mid, half: if half > 0.0 { half } else { mid.abs().max(1.0) } }
+    }
+
+    /// `(s − mid) / half`.
+    pub fn apply(self, s: f64) -> f64 {
+        (s - self.mid) / self.half
+    }
+}
+
+/// The field that is drawn. Values are kept as [`Normal`] maps them, per component.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Field {
+    association: Association,
+    kind: Kind,
+    values: Vec<f32>,
+    normal: [Normal; 4],
+    range: [[f64; 2]; 4],
+}
+
+impl Field {
+    /// Takes `component` of the array called `name` of `mesh`. With no association given, points are searched first.
+    ///
+    /// # Errors
+    /// [`Error::Field`] if no such array or component exists, or it holds no finite value.
+    pub fn new(mesh: &Mesh, name: &str, association: Option<Association>, component: Component) -> Result<Self> {
+        let sources = [(Association::Point, mesh.point_arrays()), (Association::Cell, mesh.cell_arrays())];
+        let wanted = |a: &Association| association.is_none_or(|w| w == *a);
+        let found = sources
+            .iter()
+            .filter(|(a, _)| wanted(a))
+            .find_map(|(a, arrays)| arrays.iter().find(|x| x.name == name).map(|x| (*a, x)));
+        let Some((association, array)) = found else {
+            let there = sources
+                .iter()
+                .filter(|(a, _)| wanted(a))
+                .flat_map(|(_, arrays)| arrays.iter().map(|x| format!("\"{}\"", x.name)))
+                .collect::<Vec<_>>();
+            let place = match association {
+                Some(Association::Point) => "point array",
+                Some(Association::Cell) => "cell array",
+                None => "array",
+            };
+            let there =
+                if there.is_empty() { "there is none".into() } else { format!("there are {}", there.join(", ")) };
+            return Err(Error::Field(format!("no {place} is called \"{name}\"; {there}")));
+        };
+        Self::from_array(array, association, component)
+    }
+
+    /// Takes `component` of `array`.
+    ///
+    /// # Errors
+    /// [`Error::Field`] if the array has no such component, or holds no finite value.
+    pub fn from_array(array: &Array, association: Association, component: Component) -> Result<Self> {
+        let (n, name) = (array.components, &array.name);
+        let kind = match component {
+            Component::Index(i) if i >= n => {
+                return Err(Error::Field(format!("array \"{name}\" has {n} components, so there is no component {i}")));
+            }
+            Component::All => match n {
+                1 => Kind::Scalar,
+                2 => Kind::Pair,
+                4 => Kind::Rgba,
+                _ => {
+                    return Err(Error::Field(format!(
+                        "array \"{name}\" has {n} components: choose one of them, or the magnitude"
+                    )));
+                }
+            },
+            _ => Kind::Scalar,
+        };
+        let value = |tuple: usize, k: usize| match component {
+            Component::Index(i) => array.values.get(tuple * n + i),
+            Component::Magnitude if n == 1 => array.values.get(tuple).abs(),
+            Component::Magnitude => magnitude(&array.values, tuple * n, n),
+            Component::All => array.values.get(tuple * n + k),
+        };
+        let m = kind.components();
+        let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; 4];
+        for (k, r) in range.iter_mut().enumerate().take(m) {
+            *r = (0..array.tuples())
+                .into_par_iter()
+                .map(|t| value(t, k))
+                .filter(|v| v.is_finite())
+                .fold(|| *r, |r, v| [r[0].min(v), r[1].max(v)])
+                .reduce(|| *r, |a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+            if r[0] > r[1] {
+                return Err(Error::Field(format!("array \"{name}\" holds no finite value")));
+            }
+        }
+        let mut normal = range.map(|r| Normal::new(r[0], r[1]));
+        if kind == Kind::Rgba {
+            // The colour needs no function, only its own scale: bytes are 255ths, anything else is taken as it is.
+            let one = if matches!(array.values, Values::U8(_)) { 255.0 } else { 1.0 };
+            normal[..3].fill(Normal { mid: 0.0, half: one });
+        }
+        let mut values = vec![0.0; array.tuples() * m];
+        values.par_chunks_mut(m).enumerate().for_each(|(t, out)| {
+            for (k, v) in out.iter_mut().enumerate() {
+                *v = normal[k].apply(value(t, k)) as f32;
+            }
+        });
+        Ok(Field { association, kind, values, normal, range })
+    }
+
+    /// Whether the values belong to points or to cells.
+    pub fn association(&self) -> Association {
+        self.association
+    }
+
+    /// How the components drive colour and opacity.
+    pub fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    /// The normalised values, [`Kind::components`] for each point or cell. Not finite where the array is not.
+    pub fn values(&self) -> &[f32] {
+        &self.values
+    }
+
+    /// The map that made the normalised values of component `k`.
+    pub fn normal(&self, k: usize) -> Normal {
+        self.normal[k]
+    }
+
+    /// Smallest and largest finite value of component `k`, as the array has them.
+    pub fn range(&self, k: usize) -> [f64; 2] {
+        self.range[k]
+    }
+}
+
+/// The length of the tuple at `start`, without overflow for components up to 1e300.
+#[allow(clippy::unnecessary_cast, reason = "one of the ten types is f64 already")]
+fn magnitude(values: &Values, start: usize, n: usize) -> f64 {
+    with_values!(values, v => v[start..start + n].iter().fold(0.0, |m: f64, &x| m.hypot(x as f64)))
+}

@@ -1,0 +1,30 @@
+//! Halite draws unstructured grids as volumes: every pixel is the emission–absorption integral of the field that the
+//! mesh defines.
+//!
+//! The pipeline, stage by stage; an arrow never points back:
+//!
+//! 1. [`io::open`] reads a file into a [`mesh::Mesh`]: the grid as it is, validated once.
+//! 2. [`mesh::cells`] splits its cells into tetrahedra, [`mesh::faces`] finds their neighbours.
+//! 3. [`field::Field`] is the array that is drawn, [`transfer::TransferFunction`] says how.
+//! 4. [`integral`] is the light that one straight segment of a ray inside a cell sends and lets through.
+//! 5. [`traverse`] walks each pixel's ray of a [`view::View`] from cell to cell and adds those up.
+//! 6. [`image::Image`] holds the result: linear premultiplied RGBA, 32-bit float.
+//!
+//! [`render::Renderer`] is the whole flow behind one door. [`scene`] describes a picture in a JSON file, and
+//! [`mod@reference`] is the slow float64 second opinion that the tests judge the engines by.
+
+pub mod cell;
+pub mod error;
+pub mod field;
+pub mod image;
+pub mod integral;
+pub mod io;
+pub mod mesh;
+pub mod reference;
+pub mod render;
+pub mod scene;
+pub mod transfer;
+pub mod traverse;
+pub mod view;
+
+pub use error::{Error, Result};

@@ -1,0 +1,189 @@
+//! The mesh: points, cells and data arrays of an unstructured grid, validated once.
+
+pub mod cells;
+pub mod faces;
+
+use crate::error::{Error, Result};
+use glam::DVec3;
+
+/// The values of a data array, in the type that the file or host holds them in. Tuples lie one after another.
+#[derive(Debug, Clone, PartialEq)]
+#[allow(missing_docs, reason = "each variant is named after its element type")]
+pub enum Values {
+    I8(Vec<i8>),
+    U8(Vec<u8>),
+    I16(Vec<i16>),
+    U16(Vec<u16>),
+    I32(Vec<i32>),
+    U32(Vec<u32>),
+    I64(Vec<i64>),
+    U64(Vec<u64>),
+    F32(Vec<f32>),
+    F64(Vec<f64>),
+}
+
+/// Runs `$body` with `$v` bound to the vector inside a [`Values`], whatever its type.
+macro_rules! with_values {
+    ($values:expr, $v:ident => $body:expr) => {
+        match $values {
+            $crate::mesh::Values::I8($v) => $body,
+            $crate::mesh::Values::U8($v) => $body,
+            $crate::mesh::Values::I16($v) => $body,
+            $crate::mesh::Values::U16($v) => $body,
+            $crate::mesh::Values::I32($v) => $body,
+            $crate::mesh::Values::U32($v) => $body,
+            $crate::mesh::Values::I64($v) => $body,
+            $crate::mesh::Values::U64($v) => $body,
+            $crate::mesh::Values::F32($v) => $body,
+            $crate::mesh::Values::F64($v) => $body,
+        }
+    };
+}
+pub(crate) use with_values;
+
+impl Values {
+    /// Number of values (tuples times components).
+    pub fn len(&self) -> usize {
+        with_values!(self, v => v.len())
+    }
+
+    /// True if there is no value.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Value `i` as f64.
+    ///
+    /// # Panics
+    /// If `i` is not below [`Values::len`].
+    #[allow(clippy::unnecessary_cast, reason = "one of the ten types is f64 already")]
+    pub fn get(&self, i: usize) -> f64 {
+        with_values!(self, v => v[i] as f64)
+    }
+}
+
+/// A named data array of points or cells.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Array {
+    /// Its name; several arrays of one name may exist, the first is found.
+    pub name: String,
+    /// Values per point or cell, at least 1.
+    pub components: usize,
+    /// `components` values for each point or cell.
+    pub values: Values,
+}
+
+impl Array {
+    /// Number of tuples: points or cells that it holds values for.
+    pub fn tuples(&self) -> usize {
+        self.values.len() / self.components.max(1)
+    }
+}
+
+/// The cells of a mesh, as VTK lays them out.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Cells {
+    /// VTK's cell type of each cell (`vtkCellType.h`).
+    pub types: Vec<u8>,
+    /// Cell `c` has the points `connectivity[offsets[c]..offsets[c + 1]]`; one entry more than cells, the first is 0.
+    pub offsets: Vec<u64>,
+    /// Point indices, in VTK's order for the cell type.
+    pub connectivity: Vec<u32>,
+}
+
+impl Cells {
+    /// Number of cells of all types.
+    pub fn len(&self) -> usize {
+        self.types.len()
+    }
+
+    /// True if there is no cell.
+    pub fn is_empty(&self) -> bool {
+        self.types.is_empty()
+    }
+
+    /// The point indices of cell `c`.
+    ///
+    /// # Panics
+    /// If `c` is not below [`Cells::len`].
+    pub fn points(&self, c: usize) -> &[u32] {
+        &self.connectivity[self.offsets[c] as usize..self.offsets[c + 1] as usize]
+    }
+}
+
+/// An unstructured grid: a value of this type cannot be malformed. Point coordinates may still be NaN or infinite:
+/// cells that touch such a point are left out when the cells are split.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Mesh {
+    points: Vec<DVec3>,
+    cells: Cells,
+    point_arrays: Vec<Array>,
+    cell_arrays: Vec<Array>,
+}
+
+impl Mesh {
+    /// Checks the parts and makes a mesh of them.
+    ///
+    /// # Errors
+    /// [`Error::Mesh`] if there are more than 2³² − 2 points, if offsets do not start at 0, decrease or pass the end of the
+    /// connectivity, if a cell names a point that does not exist, or if an array's length is not
+    /// components × points (or cells).
+    pub fn new(points: Vec<DVec3>, cells: Cells, point_arrays: Vec<Array>, cell_arrays: Vec<Array>) -> Result<Self> {
+        let fail = |what: String| Err(Error::Mesh(what));
+        if points.len() >= u32::MAX as usize {
+            return fail(format!("{} points are more than Halite can index (2^32 - 2)", points.len()));
+        }
+        let n = cells.types.len();
+        if cells.offsets.len() != n + 1 || cells.offsets[0] != 0 {
+            return fail(format!("{n} cells need {} offsets, the first of them 0", n + 1));
+        }
+        if let Some(c) = cells.offsets.windows(2).position(|w| w[1] < w[0]) {
+            return fail(format!("the offsets decrease at cell {c}"));
+        }
+        if cells.offsets[n] != cells.connectivity.len() as u64 {
+            return fail(format!(
+                "the offsets end at {}, but the connectivity has {} entries",
+                cells.offsets[n],
+                cells.connectivity.len()
+            ));
+        }
+        if let Some(i) = cells.connectivity.iter().position(|&p| p as usize >= points.len()) {
+            let c = cells.offsets.partition_point(|&o| o <= i as u64) - 1;
+            let (p, count) = (cells.connectivity[i], points.len());
+            return fail(format!("cell {c} names point {p}, but there are {count} points"));
+        }
+        for (kind, arrays, count) in [("point", &point_arrays, points.len()), ("cell", &cell_arrays, n)] {
+            for a in arrays {
+                if a.components == 0 || count.checked_mul(a.components) != Some(a.values.len()) {
+                    return fail(format!(
+                        "{kind} array \"{}\" has {} values, not {} components for each of {count} {kind}s",
+                        a.name,
+                        a.values.len(),
+                        a.components
+                    ));
+                }
+            }
+        }
+        Ok(Mesh { points, cells, point_arrays, cell_arrays })
+    }
+
+    /// The points, in world coordinates.
+    pub fn points(&self) -> &[DVec3] {
+        &self.points
+    }
+
+    /// The cells, of every type that the file has.
+    pub fn cells(&self) -> &Cells {
+        &self.cells
+    }
+
+    /// The arrays with a value for each point.
+    pub fn point_arrays(&self) -> &[Array] {
+        &self.point_arrays
+    }
+
+    /// The arrays with a value for each cell.
+    pub fn cell_arrays(&self) -> &[Array] {
+        &self.cell_arrays
+    }
+}

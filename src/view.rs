@@ -1,0 +1,274 @@
+//! The view: camera, image size, and what limits each ray: clipping range, clipping planes, a depth buffer.
+
+use crate::error::{Error, Result};
+use glam::{DVec2, DVec3};
+
+/// How the camera maps the world to the image plane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Projection {
+    /// Rays start at the camera's position and fan out.
+    Perspective {
+        /// The vertical angle of view, in degrees, in (0, 180).
+        view_angle: f64,
+    },
+    /// Rays are parallel.
+    Parallel {
+        /// Half the height of the view, in world units.
+        parallel_scale: f64,
+    },
+}
+
+/// VTK's camera, in world coordinates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Camera {
+    /// Where the camera is.
+    pub position: DVec3,
+    /// The point in the middle of the image.
+    pub focal_point: DVec3,
+    /// A direction that points up in the image; need not be perpendicular to the view.
+    pub view_up: DVec3,
+    /// Perspective or parallel.
+    pub projection: Projection,
+}
+
+/// A plane that keeps the half space `(x − origin) · normal ≥ 0`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ClippingPlane {
+    /// A point of the plane, in world coordinates.
+    pub origin: DVec3,
+    /// The normal, of any length but 0; it points into what is kept.
+    pub normal: DVec3,
+}
+
+/// What the numbers of a depth buffer are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DepthKind {
+    /// OpenGL's window z, in [0, 1], with the view's clipping range.
+    Window,
+    /// Distance from the camera along the view direction, in world units.
+    Eye,
+    /// Distance along the ray, from the camera (perspective) or the plane through it (parallel), in world units.
+    Ray,
+}
+
+/// A depth for each pixel, at which its ray ends.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DepthBuffer {
+    /// What the values are.
+    pub kind: DepthKind,
+    /// One value per pixel, row by row, row 0 at the top; infinite where nothing ends the ray.
+    pub values: Vec<f64>,
+}
+
+/// How what lies along a ray becomes one pixel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Blend {
+    /// Emission and absorption, integrated.
+    #[default]
+    Composite,
+    /// The colour and opacity of the largest value along the ray (of the last component, if there are several).
+    Maximum,
+}
+
+/// One pixel's ray `origin + t direction`, and the part of it that is seen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ray {
+    /// Where t is 0, in world coordinates.
+    pub origin: DVec3,
+    /// A unit vector.
+    pub direction: DVec3,
+    /// Where the ray starts; may be −∞.
+    pub t_min: f64,
+    /// Where it ends; may be ∞, and nothing is seen where it is not above `t_min`.
+    pub t_max: f64,
+}
+
+/// What to draw: the camera, the size of the image and everything that limits the rays.
+#[derive(Debug, Clone, PartialEq)]
+pub struct View {
+    camera: Camera,
+    size: [u32; 2],
+    pixel_offset: DVec2,
+    clipping_range: Option<[f64; 2]>,
+    clipping_planes: Vec<ClippingPlane>,
+    depth: Option<DepthBuffer>,
+    blend: Blend,
+    /// Right, up and forward unit vectors.
+    axes: [DVec3; 3],
+}
+
+impl View {
+    /// A view of `size` (width, height) pixels.
+    ///
+    /// # Errors
+    /// [`Error::View`] if the size is 0 or above 2²⁸ pixels, a camera parameter is not finite, the camera looks nowhere
+    /// (position equals focal point, or view up lies along the view), or the angle or scale is out of range.
+    pub fn new(camera: Camera, size: [u32; 2]) -> Result<Self> {
+        let fail = |what: String| Err(Error::View(what));
+        if size[0] == 0 || size[1] == 0 || u64::from(size[0]) * u64::from(size[1]) > 1 << 28 {
+            return fail(format!("an image of {}x{} pixels", size[0], size[1]));
+        }
+        for (what, v) in
+            [("position", camera.position), ("focal point", camera.focal_point), ("view up", camera.view_up)]
+        {
+            if !v.is_finite() {
+                return fail(format!("the camera's {what} is {v}"));
+            }
+        }
+        match camera.projection {
+            Projection::Perspective { view_angle: a } if !(a > 0.0 && a < 180.0) => {
+                return fail(format!("the view angle is {a} degrees: it lies between 0 and 180"));
+            }
+            Projection::Parallel { parallel_scale: s } if !(s > 0.0 && s.is_finite()) => {
+                return fail(format!("the parallel scale is {s}: it is above 0"));
+            }
+            _ => {}
+        }
+        let Some(forward) = direction(camera.focal_point - camera.position) else {
+            return fail("the camera's position and focal point are the same".into());
+        };
+        let Some(right) = direction(camera.view_up).and_then(|up| direction(forward.cross(up))) else {
+            return fail("the view up vector is zero or lies along the view".into());
+        };
+        let axes = [right, right.cross(forward), forward];
+        Ok(View {
+            camera,
+            size,
+            pixel_offset: DVec2::ZERO,
+            clipping_range: None,
+            clipping_planes: Vec::new(),
+            depth: None,
+            blend: Blend::default(),
+            axes,
+        })
+    }
+
+    /// Samples each pixel at this offset from its centre, in pixels (right, up).
+    pub fn with_pixel_offset(mut self, offset: DVec2) -> Self {
+        self.pixel_offset = offset;
+        self
+    }
+
+    /// Keeps what lies between two distances from the camera along the view direction, in world units.
+    ///
+    /// # Errors
+    /// [`Error::View`] if they do not ascend, or the near one is not above 0 in a perspective view.
+    pub fn with_clipping_range(mut self, [near, far]: [f64; 2]) -> Result<Self> {
+        let perspective = matches!(self.camera.projection, Projection::Perspective { .. });
+        if near.is_nan() || far.is_nan() || near >= far || (perspective && near <= 0.0) {
+            return Err(Error::View(format!("the clipping range is {near} to {far}")));
+        }
+        self.clipping_range = Some([near, far]);
+        Ok(self)
+    }
+
+    /// Keeps what all of `planes` keep.
+    ///
+    /// # Errors
+    /// [`Error::View`] if a plane is not finite or its normal is zero.
+    pub fn with_clipping_planes(mut self, planes: Vec<ClippingPlane>) -> Result<Self> {
+        if let Some(p) = planes.iter().find(|p| !p.origin.is_finite() || direction(p.normal).is_none()) {
+            return Err(Error::View(format!("the clipping plane at {} has the normal {}", p.origin, p.normal)));
+        }
+        self.clipping_planes = planes;
+        Ok(self)
+    }
+
+    /// Ends each pixel's ray at a depth.
+    ///
+    /// # Errors
+    /// [`Error::View`] if there is not one value for each pixel, or window depths come without a clipping range.
+    pub fn with_depth(mut self, depth: DepthBuffer) -> Result<Self> {
+        let [w, h] = self.size;
+        if depth.values.len() != w as usize * h as usize {
+            return Err(Error::View(format!("{} depths for an image of {w}x{h} pixels", depth.values.len())));
+        }
+        if depth.kind == DepthKind::Window && self.clipping_range.is_none_or(|r| !r[1].is_finite()) {
+            return Err(Error::View("window depths mean nothing without a finite clipping range".into()));
+        }
+        self.depth = Some(depth);
+        Ok(self)
+    }
+
+    /// Blends another way.
+    pub fn with_blend(mut self, blend: Blend) -> Self {
+        self.blend = blend;
+        self
+    }
+
+    /// Width and height in pixels.
+    pub fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    /// The camera.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// The blending.
+    pub fn blend(&self) -> Blend {
+        self.blend
+    }
+
+    /// The ray through pixel coordinates `x` (from the left) and `y` (from the top), in pixels; the centre of the first
+    /// pixel is at 0.5. Nothing but the camera limits it.
+    pub fn ray_through(&self, x: f64, y: f64) -> Ray {
+        let [w, h] = self.size.map(f64::from);
+        let [right, up, forward] = self.axes;
+        let ndc = DVec2::new(2.0 * x / w - 1.0, 1.0 - 2.0 * y / h);
+        match self.camera.projection {
+            Projection::Perspective { view_angle } => {
+                let tan = (view_angle.to_radians() / 2.0).tan();
+                let direction = forward + right * (ndc.x * tan * w / h) + up * (ndc.y * tan);
+                let direction = direction.normalize();
+                Ray { origin: self.camera.position, direction, t_min: 0.0, t_max: f64::INFINITY }
+            }
+            Projection::Parallel { parallel_scale: s } => {
+                let origin = self.camera.position + right * (ndc.x * s * w / h) + up * (ndc.y * s);
+                Ray { origin, direction: forward, t_min: f64::NEG_INFINITY, t_max: f64::INFINITY }
+            }
+        }
+    }
+
+    /// The ray of pixel (column `i`, row `j`), with the part of it that clipping and depth leave.
+    pub fn ray(&self, i: u32, j: u32) -> Ray {
+        let (x, y) = (f64::from(i) + 0.5 + self.pixel_offset.x, f64::from(j) + 0.5 - self.pixel_offset.y);
+        let mut ray = self.ray_through(x, y);
+        let cos = ray.direction.dot(self.axes[2]);
+        if let Some([near, far]) = self.clipping_range {
+            ray.t_min = ray.t_min.max(near / cos);
+            ray.t_max = ray.t_max.min(far / cos);
+        }
+        for p in &self.clipping_planes {
+            let (height, slope) = ((ray.origin - p.origin).dot(p.normal), ray.direction.dot(p.normal));
+            let t = -height / slope;
+            if slope > 0.0 {
+                ray.t_min = ray.t_min.max(t);
+            } else if slope < 0.0 {
+                ray.t_max = ray.t_max.min(t);
+            } else if height < 0.0 {
+                ray.t_max = f64::NEG_INFINITY;
+            }
+        }
+        if let Some(depth) = &self.depth {
+            let d = depth.values[j as usize * self.size[0] as usize + i as usize];
+            let t = match (depth.kind, self.clipping_range) {
+                (DepthKind::Window, Some([near, far])) => match self.camera.projection {
+                    Projection::Perspective { .. } => near * far / (far - d * (far - near)) / cos,
+                    Projection::Parallel { .. } => (near + d * (far - near)) / cos,
+                },
+                (DepthKind::Ray, _) => d,
+                _ => d / cos,
+            };
+            // A NaN depth ends nothing.
+            ray.t_max = ray.t_max.min(t);
+        }
+        ray
+    }
+}
+
+/// `v` scaled to length 1, whatever its length; none if it is zero or not finite.
+fn direction(v: DVec3) -> Option<DVec3> {
+    (v / v.abs().max_element()).try_normalize()
+}
