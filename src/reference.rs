@@ -122,8 +122,8 @@ impl<'a> Reference<'a> {
         // t counts from the point nearest to the middle: far cameras then lose no digits.
         let shift = -origin.dot(ray.direction);
         let origin = origin + ray.direction * shift;
-        let aside = DVec3::new(0.541, -0.623, 0.565) * (self.extent * 1e-11);
-        let tries = (0..8).map(|n| self.intervals(origin + aside * f64::from(n), ray.direction));
+        let aside = DVec3::new(0.86, -0.19, 0.47) * (self.extent * 1e-11);
+        let tries = (0..8).map(|n| self.intervals(origin + aside * f64::from((1 << n) - 1), ray.direction));
         // A ray that lies in a face or an edge belongs to no cell, or to several: it is moved off.
         let mut intervals = tries.flatten().next().unwrap_or_default();
         intervals.sort_by(|a, b| a.t[0].total_cmp(&b.t[0]).then(a.t[1].total_cmp(&b.t[1])));
@@ -152,9 +152,8 @@ impl<'a> Reference<'a> {
         let mut light = Light { color: [0.0; 3], transmittance: 1.0 };
         for interval in intervals {
             for [u0, u1] in self.pieces(&interval) {
-                light.add(&self.piece(&interval, u0, u1), self.transfer);
-                if light.transmittance == 0.0 {
-                    break;
+                if light.transmittance > 0.0 {
+                    light.add(&self.piece(&interval, u0, u1), self.transfer);
                 }
             }
         }
@@ -196,12 +195,13 @@ impl<'a> Reference<'a> {
         let knots = self.transfer.opacity();
         knots.iter().for_each(|k| cut(last, k.0));
         if self.transfer.convention() == Convention::Opacity {
-            for k in knots.windows(2).filter(|k| (k[0].1 < 1.0) != (k[1].1 < 1.0)) {
+            for k in knots.windows(2).filter(|k| (k[0].1 - 1.0) * (k[1].1 - 1.0) < 0.0) {
                 cut(last, k[0].0 + (k[1].0 - k[0].0) * ((1.0 - k[0].1) / (k[1].1 - k[0].1)));
             }
         }
         cuts.sort_by(f64::total_cmp);
-        cuts.windows(2).map(|c| [c[0], c[1]]).filter(|c| c[1] - c[0] > 1e-15).collect()
+        // What is shorter is rounding, and might take a peak that touches 1 for a plateau.
+        cuts.windows(2).map(|c| [c[0], c[1]]).filter(|c| c[1] - c[0] > 1e-12).collect()
     }
 
     /// Colour and opacity at the ends of a piece, as its inside has them: at a step the ends belong to either side.
@@ -248,8 +248,11 @@ impl Tetrahedron {
                 return Some(None);
             }
             let (height, slope) = (normal.dot(face[0] - origin), normal.dot(direction));
-            lies |= height.abs() <= 1e-12 * extent && slope.abs() <= 1e-10;
-            if slope == 0.0 {
+            faces[k] = (face[0], normal / side);
+            if height.abs() <= 1e-12 * extent && slope.abs() <= 1e-10 {
+                // Rounding would place the crossing: the other faces tell whether the ray meets this one.
+                lies = true;
+            } else if slope == 0.0 {
                 if (height > 0.0) == (side > 0.0) {
                     return Some(None);
                 }
@@ -258,7 +261,6 @@ impl Tetrahedron {
             } else {
                 t[1] = t[1].min(height / slope);
             }
-            faces[k] = (face[0], normal / side);
         }
         if t[1] <= t[0] {
             return Some(None);
