@@ -238,7 +238,7 @@ impl Tetrahedron {
         let mut t = [f64::NEG_INFINITY, f64::INFINITY];
         let mut faces = [(DVec3::ZERO, DVec3::ZERO); 4];
         let mut lies = false;
-        for k in 0..4 {
+        for (k, weight) in faces.iter_mut().enumerate() {
             // In the order of their positions, so that both cells of a face compute the same bits.
             let mut face = [1, 2, 3].map(|j| self.corners[(k + j) % 4]);
             face.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z)));
@@ -248,7 +248,7 @@ impl Tetrahedron {
                 return Some(None);
             }
             let (height, slope) = (normal.dot(face[0] - origin), normal.dot(direction));
-            faces[k] = (face[0], normal / side);
+            *weight = (face[0], normal / side);
             if height.abs() <= 1e-12 * extent && slope.abs() <= 1e-10 {
                 // Rounding would place the crossing: the other faces tell whether the ray meets this one.
                 lies = true;
@@ -303,7 +303,7 @@ impl Light {
             self.transmittance = 0.0;
             return;
         }
-        // −ln(1 − a) is infinite at a = 1, but integrable.
+        // Not `transfer.extinction`, which is infinite from OPAQUE on: −ln(1 − a) is integrable up to a = 1.
         let extinction = |a: f64| if logarithmic { -(1.0 - a).max(1e-300).ln() } else { a } * per_unit;
         let depth = |x: f64| {
             let a = a0 + (a1 - a0) * x;
@@ -331,8 +331,8 @@ impl Light {
             [r * density, g * density, b * density]
         };
         let sum = adaptive(&emission, 0.0, seen, gauss(emission, 0.0, seen), 60);
-        for k in 0..3 {
-            self.color[k] += self.transmittance * sum[k];
+        for (color, sum) in self.color.iter_mut().zip(sum) {
+            *color += self.transmittance * sum;
         }
         self.transmittance *= (-depth(1.0)).exp();
         if self.transmittance < 1e-20 {
@@ -365,9 +365,7 @@ fn gauss(f: impl Fn(f64) -> [f64; 3], a: f64, b: f64) -> [f64; 3] {
     let mut sum = [0.0; 3];
     for [x, weight] in NODES {
         let (left, right) = (f(middle - half * x), f(middle + half * x));
-        for k in 0..3 {
-            sum[k] += half * weight * (left[k] + right[k]);
-        }
+        sum = std::array::from_fn(|k| sum[k] + half * weight * (left[k] + right[k]));
     }
     sum
 }

@@ -1,5 +1,7 @@
 //! The judge is judged by closed forms.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use glam::DVec3;
 use halite::error::Error;
 use halite::field::{Association, Component, Field};
