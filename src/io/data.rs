@@ -10,6 +10,7 @@ use base64::Engine;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use flate2::{Decompress, FlushDecompress, Status};
 use rayon::prelude::*;
+use std::fmt::{Display, Formatter};
 use std::fs::File;
 use std::ops::Range;
 use std::path::Path;
@@ -39,6 +40,13 @@ pub(super) struct DataArray {
     pub(super) kind: Kind,
     pub(super) components: usize,
     pub(super) data: Data,
+}
+
+impl Display for DataArray {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} array \"{}\"", self.section, self.name.escape_debug())?;
+        if self.piece > 0 { write!(f, " of piece {}", self.piece) } else { Ok(()) }
+    }
 }
 
 /// Where the numbers of a data array are.
@@ -113,18 +121,15 @@ impl Store<'_> {
             Data::Base64(ranges) => self.text(ranges).map_err(Fault::Io).and_then(|mut text| {
                 text.retain(|c| !c.is_ascii_whitespace());
                 let end = text.len() as u64;
-                self.decode(Bytes { source: Source::Memory(text), base64: true, start: 0, end, skip: 0 }, count, put)
+                let source = Source::Memory(text);
+                self.decode(array, Bytes { source, base64: true, start: 0, end, skip: 0 }, count, put)
             }),
-            Data::Appended(offset) => self.appended(*offset).and_then(|bytes| self.decode(bytes, count, put)),
+            Data::Appended(offset) => self.appended(*offset).and_then(|bytes| self.decode(array, bytes, count, put)),
         };
-        result.map_err(|fault| {
-            let piece = if array.piece > 0 { format!(" of piece {}", array.piece) } else { String::new() };
-            let name = format!("{} array \"{}\"{piece}", array.section, array.name);
-            match fault {
-                Fault::Io(source) => Error::file(self.path, source),
-                Fault::Malformed(what) => Error::malformed(self.path, format!("{name}: {what}")),
-                Fault::Unsupported(what) => Error::unsupported(self.path, format!("{name}: {what}")),
-            }
+        result.map_err(|fault| match fault {
+            Fault::Io(source) => Error::file(self.path, source),
+            Fault::Malformed(what) => Error::malformed(self.path, format!("{array}: {what}")),
+            Fault::Unsupported(what) => Error::unsupported(self.path, format!("{array}: {what}")),
         })
     }
 
@@ -157,6 +162,7 @@ impl Store<'_> {
     /// Decodes binary numbers.
     fn decode<T: Number, U: bytemuck::Pod + Send>(
         &self,
+        array: &DataArray,
         bytes: Bytes<'_>,
         count: u64,
         put: impl Fn(usize, &[T], &mut [U]) -> Result<(), String> + Sync,
@@ -165,7 +171,7 @@ impl Store<'_> {
         let total =
             count.checked_mul(size).ok_or_else(|| format!("{count} numbers are more than any file can hold"))?;
         let mut blocks = match self.compressor.as_deref() {
-            None => self.plain(bytes)?,
+            None => self.plain(array, bytes, total)?,
             Some("vtkZLibDataCompressor") => self.packed(bytes)?,
             Some(other) => {
                 return Err(Fault::Unsupported(format!(
@@ -188,12 +194,21 @@ impl Store<'_> {
         blocks.fill(count, self.big_endian != cfg!(target_endian = "big"), put)
     }
 
-    /// The blocks of an array that is not compressed. Its header is its length in bytes.
-    fn plain<'b>(&self, bytes: Bytes<'b>) -> Result<Blocks<'b>, Fault> {
-        let total = self.words(&bytes, 1)?[0];
+    /// The blocks of an array that is not compressed, and needs `total` bytes. Its header says how many it has; in point and
+    /// cell data there may be more, as some writers count wrongly (GetFEM) and VTK does not mind.
+    fn plain<'b>(&self, array: &DataArray, bytes: Bytes<'b>, total: u64) -> Result<Blocks<'b>, Fault> {
+        let stated = self.words(&bytes, 1)?[0];
         let body = bytes.after(self.word)?;
+        if stated > total && array.section.ends_with("Data") {
+            tracing::warn!(
+                "{}: {array} has {stated} bytes; only {total} of them are needed and read",
+                self.path.display()
+            );
+        } else if stated != total {
+            return Err(format!("it holds {stated} bytes, but its numbers need {total}").into());
+        }
         if total > body.length() {
-            return Err(format!("it says that it has {total} bytes, but the file ends after {}", body.length()).into());
+            return Err(format!("the file ends after {} of its {total} bytes", body.length()).into());
         }
         Ok(Blocks::plain(body, total))
     }

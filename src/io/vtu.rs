@@ -200,7 +200,8 @@ impl<'a> Head<'a> {
     /// Notes a data array.
     fn array(&mut self, section: Section, tag: &BytesStart<'_>) -> Result<Element> {
         let name = self.attribute(tag, "Name")?.unwrap_or_default();
-        let fail = |what: String| self.malformed(format!("{} array \"{name}\": {what}", section.name()));
+        let fail =
+            |what: String| self.malformed(format!("{} array \"{}\": {what}", section.name(), name.escape_debug()));
         let kind = self.attribute(tag, "type")?.unwrap_or_default();
         if kind == "String" || kind == "Bit" {
             tracing::warn!(
@@ -211,7 +212,7 @@ impl<'a> Head<'a> {
             return Ok(Element::Other);
         }
         let kind = Kind::from_name(&kind).ok_or_else(|| fail(format!("its type is \"{}\"", kind.escape_debug())))?;
-        let components = match self.attribute(tag, "NumberOfComponents")? {
+        let components = match self.attribute(tag, "NumberOfComponents")?.filter(|text| !text.is_empty()) {
             Some(text) => {
                 let components = text.trim().parse::<u32>();
                 components.map_err(|_| fail(format!("NumberOfComponents is \"{}\"", text.escape_debug())))?.max(1)
