@@ -1,5 +1,7 @@
 //! Meshes, their split into tetrahedra, and the faces of these.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "helpers of tests fail like tests do")]
+
 use glam::{DMat3, DVec3, dvec3};
 use halite::mesh::cells::{self, Tetrahedra};
 use halite::mesh::faces::{BOUNDARY, Faces};
