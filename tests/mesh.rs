@@ -1,5 +1,7 @@
 //! Meshes, their split into tetrahedra, and the faces of these.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "helpers of tests fail like tests do")]
+
 use glam::{DMat3, DVec3, dvec3};
 use halite::mesh::cells::{self, Tetrahedra};
 use halite::mesh::faces::{BOUNDARY, Faces};
@@ -406,7 +408,7 @@ fn flat_cells_fit_their_neighbours_however_they_are_listed() {
         assert_eq!((f.flat, f.folded, f.boundary.len(), f.components()), (1, 0, 8, 1));
         assert!(!f.neighbours[1].contains(&BOUNDARY));
     }
-    // Two flat cells on each other, between cells that are cut alike: demands arrive in rounds.
+    // Cells on both sides that are cut alike need no flat cell: two of its faces then have three cells.
     let around = [[0, 1, 2, 4], [0, 2, 3, 4], [0, 1, 2, 5], [0, 2, 3, 5]];
     let mut corners = vec![[0, 1, 2, 3]];
     corners.extend(around);
