@@ -2,6 +2,7 @@
 
 pub mod cells;
 pub mod faces;
+pub mod generate;
 
 use crate::error::{Error, Result};
 use glam::DVec3;
