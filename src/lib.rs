@@ -20,6 +20,7 @@ pub mod image;
 pub mod integral;
 pub mod io;
 pub mod mesh;
+pub mod real;
 pub mod reference;
 pub mod render;
 pub mod scene;
