@@ -472,7 +472,8 @@ mod tests {
 
     #[test]
     fn pieces_match_their_integrals() {
-        let depths = [0.0, 1e-30, 1e-12, 1e-6, 1e-3, 0.03, 0.2, 0.24, 0.26, 0.41, 0.9, 2.0, 3.9, 4.1, 9.0, 17.0, 40.0, 300.0];
+        let depths =
+            [0.0, 1e-30, 1e-12, 1e-6, 1e-3, 0.03, 0.2, 0.24, 0.26, 0.41, 0.9, 2.0, 3.9, 4.1, 9.0, 17.0, 40.0, 300.0];
         for x in depths {
             for y in depths {
                 let [alpha, beta, psi, phi] = truth(x, y);
