@@ -67,6 +67,11 @@ impl Normal {
     pub fn apply(self, s: f64) -> f64 {
         (s - self.mid) / self.half
     }
+
+    /// `mid + half · s`.
+    pub fn invert(self, s: f64) -> f64 {
+        self.mid + self.half * s
+    }
 }
 
 /// The field that is drawn. Values are kept as [`Normal`] maps them, per component.

@@ -122,8 +122,8 @@ impl<'a> Reference<'a> {
         // t counts from the point nearest to the middle: far cameras then lose no digits.
         let shift = -origin.dot(ray.direction);
         let origin = origin + ray.direction * shift;
-        let aside = DVec3::new(0.541, -0.623, 0.565) * (self.extent * 1e-11);
-        let tries = (0..8).map(|n| self.intervals(origin + aside * f64::from(n), ray.direction));
+        let aside = DVec3::new(0.86, -0.19, 0.47) * (self.extent * 1e-11);
+        let tries = (0..8).map(|n| self.intervals(origin + aside * f64::from((1 << n) - 1), ray.direction));
         // A ray that lies in a face or an edge belongs to no cell, or to several: it is moved off.
         let mut intervals = tries.flatten().next().unwrap_or_default();
         intervals.sort_by(|a, b| a.t[0].total_cmp(&b.t[0]).then(a.t[1].total_cmp(&b.t[1])));
@@ -152,9 +152,8 @@ impl<'a> Reference<'a> {
         let mut light = Light { color: [0.0; 3], transmittance: 1.0 };
         for interval in intervals {
             for [u0, u1] in self.pieces(&interval) {
-                light.add(&self.piece(&interval, u0, u1), self.transfer);
-                if light.transmittance == 0.0 {
-                    break;
+                if light.transmittance > 0.0 {
+                    light.add(&self.piece(&interval, u0, u1), self.transfer);
                 }
             }
         }
@@ -196,12 +195,13 @@ impl<'a> Reference<'a> {
         let knots = self.transfer.opacity();
         knots.iter().for_each(|k| cut(last, k.0));
         if self.transfer.convention() == Convention::Opacity {
-            for k in knots.windows(2).filter(|k| (k[0].1 < 1.0) != (k[1].1 < 1.0)) {
+            for k in knots.windows(2).filter(|k| (k[0].1 - 1.0) * (k[1].1 - 1.0) < 0.0) {
                 cut(last, k[0].0 + (k[1].0 - k[0].0) * ((1.0 - k[0].1) / (k[1].1 - k[0].1)));
             }
         }
         cuts.sort_by(f64::total_cmp);
-        cuts.windows(2).map(|c| [c[0], c[1]]).filter(|c| c[1] - c[0] > 1e-15).collect()
+        // What is shorter is rounding, and might take a peak that touches 1 for a plateau.
+        cuts.windows(2).map(|c| [c[0], c[1]]).filter(|c| c[1] - c[0] > 1e-12).collect()
     }
 
     /// Colour and opacity at the ends of a piece, as its inside has them: at a step the ends belong to either side.
@@ -238,7 +238,7 @@ impl Tetrahedron {
         let mut t = [f64::NEG_INFINITY, f64::INFINITY];
         let mut faces = [(DVec3::ZERO, DVec3::ZERO); 4];
         let mut lies = false;
-        for k in 0..4 {
+        for (k, weight) in faces.iter_mut().enumerate() {
             // In the order of their positions, so that both cells of a face compute the same bits.
             let mut face = [1, 2, 3].map(|j| self.corners[(k + j) % 4]);
             face.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z)));
@@ -248,8 +248,11 @@ impl Tetrahedron {
                 return Some(None);
             }
             let (height, slope) = (normal.dot(face[0] - origin), normal.dot(direction));
-            lies |= height.abs() <= 1e-12 * extent && slope.abs() <= 1e-10;
-            if slope == 0.0 {
+            *weight = (face[0], normal / side);
+            if height.abs() <= 1e-12 * extent && slope.abs() <= 1e-10 {
+                // Rounding would place the crossing: the other faces tell whether the ray meets this one.
+                lies = true;
+            } else if slope == 0.0 {
                 if (height > 0.0) == (side > 0.0) {
                     return Some(None);
                 }
@@ -258,7 +261,6 @@ impl Tetrahedron {
             } else {
                 t[1] = t[1].min(height / slope);
             }
-            faces[k] = (face[0], normal / side);
         }
         if t[1] <= t[0] {
             return Some(None);
@@ -301,7 +303,7 @@ impl Light {
             self.transmittance = 0.0;
             return;
         }
-        // −ln(1 − a) is infinite at a = 1, but integrable.
+        // Not `transfer.extinction`, which is infinite from OPAQUE on: −ln(1 − a) is integrable up to a = 1.
         let extinction = |a: f64| if logarithmic { -(1.0 - a).max(1e-300).ln() } else { a } * per_unit;
         let depth = |x: f64| {
             let a = a0 + (a1 - a0) * x;
@@ -329,8 +331,8 @@ impl Light {
             [r * density, g * density, b * density]
         };
         let sum = adaptive(&emission, 0.0, seen, gauss(emission, 0.0, seen), 60);
-        for k in 0..3 {
-            self.color[k] += self.transmittance * sum[k];
+        for (color, sum) in self.color.iter_mut().zip(sum) {
+            *color += self.transmittance * sum;
         }
         self.transmittance *= (-depth(1.0)).exp();
         if self.transmittance < 1e-20 {
@@ -363,9 +365,7 @@ fn gauss(f: impl Fn(f64) -> [f64; 3], a: f64, b: f64) -> [f64; 3] {
     let mut sum = [0.0; 3];
     for [x, weight] in NODES {
         let (left, right) = (f(middle - half * x), f(middle + half * x));
-        for k in 0..3 {
-            sum[k] += half * weight * (left[k] + right[k]);
-        }
+        sum = std::array::from_fn(|k| sum[k] + half * weight * (left[k] + right[k]));
     }
     sum
 }

@@ -211,6 +211,25 @@ impl View {
         self.blend
     }
 
+    /// The sampling offset, in pixels.
+    pub fn pixel_offset(&self) -> DVec2 {
+        self.pixel_offset
+    }
+
+    /// Where the world point `p` is in the image, in pixels from its upper left corner; none if it is not in front of a
+    /// perspective camera.
+    pub fn pixel(&self, p: DVec3) -> Option<DVec2> {
+        let [w, h] = self.size.map(f64::from);
+        let from_camera = p - self.camera.position;
+        let [x, y, depth] = self.axes.map(|a| from_camera.dot(a));
+        let half_height = match self.camera.projection {
+            Projection::Perspective { .. } if depth <= 1e-6 * from_camera.length() => return None,
+            Projection::Perspective { view_angle } => depth * (view_angle.to_radians() / 2.0).tan(),
+            Projection::Parallel { parallel_scale } => parallel_scale,
+        };
+        Some(DVec2::new(0.5 * (w + h * x / half_height), 0.5 * h * (1.0 - y / half_height)))
+    }
+
     /// The ray through pixel coordinates `x` (from the left) and `y` (from the top), in pixels; the centre of the first
     /// pixel is at 0.5. Nothing but the camera limits it.
     pub fn ray_through(&self, x: f64, y: f64) -> Ray {

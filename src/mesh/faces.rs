@@ -286,7 +286,11 @@ impl Matcher<'_> {
             let opposite = |h: &Half| (self.welded(h.tetrahedron())[h.face as usize % 4], h.face);
             group.iter().copied().filter(|h| h.side(orientation) == side).min_by_key(opposite)
         };
-        let pair = first(1).zip(first(-1));
+        let pair = match *group {
+            // Nearly every face: there is nothing to choose, so nothing to look up.
+            [a, b] => (a.side(orientation) != b.side(orientation)).then_some((a, b)),
+            _ => first(1).zip(first(-1)),
+        };
         if let Some((a, b)) = pair {
             for (from, to) in [(a, b), (b, a)] {
                 neighbours[from.tetrahedron()][from.face as usize % 4].store(to.face / 4, Relaxed);

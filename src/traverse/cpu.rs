@@ -1,0 +1,320 @@
+//! The walk on the CPU: the twin of the GPU's, for machines without one.
+//!
+//! Positions are f64, so that thin layers and great distances cost no accuracy; segments are integrated in f32.
+
+use super::boundary::{Beam, Candidate};
+use super::{Geometry, Values};
+use crate::cell::{Face, Frame};
+use crate::image::Image;
+use crate::integral::{Exact, Light};
+use crate::mesh::faces::BOUNDARY;
+use crate::view::{Blend, Projection, View};
+use glam::DVec2;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+
+/// Width and height of the square of pixels whose rays share their search for entries.
+const TILE: u32 = 8;
+
+/// Transmittance below which a ray ends: what lies behind adds less than this to any channel.
+pub const NEGLIGIBLE: f32 = 1e-6;
+
+/// A ray that passes a boundary face this close to its edge (as a barycentric weight) is traced again beside it: where
+/// boundary faces only meet without sharing their corners, rounding could let it slip through.
+const TOO_CLOSE: f64 = 1e-12;
+
+/// How far aside, in normalised units.
+const ASIDE: f64 = 1e-9;
+
+/// What a frame took.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Tetrahedra visited, over all rays.
+    pub steps: u64,
+    /// Rays that were traced again beside an edge.
+    pub repaired: u64,
+}
+
+/// Draws a frame on the current rayon pool. `pixel` turns the largest values along a ray into a premultiplied colour for
+/// [`Blend::Maximum`]; `progress` is told the share that is done.
+pub fn render<const N: usize>(
+    geometry: &Geometry,
+    values: &Values<N>,
+    exact: &Exact<f32>,
+    pixel: &(dyn Fn(&[f32; N]) -> [f32; 4] + Sync),
+    view: &View,
+    progress: &(dyn Fn(f64) + Sync),
+) -> (Image, Counts) {
+    let mut image = Image::new(view.size());
+    let [w, h] = view.size();
+    let (done, bands) = (AtomicUsize::new(0), h.div_ceil(TILE) as usize);
+    let counts = image
+        .pixels
+        .par_chunks_mut((w * TILE) as usize)
+        .enumerate()
+        .map(|(band, rows)| {
+            let mut tracer = Tracer::new(geometry, values, exact, view);
+            for left in (0..w).step_by(TILE as usize) {
+                tracer.tile(left, band as u32 * TILE, rows, pixel);
+            }
+            progress((done.fetch_add(1, Relaxed) + 1) as f64 / bands as f64);
+            tracer.counts
+        })
+        .reduce(Counts::default, |a, b| Counts { steps: a.steps + b.steps, repaired: a.repaired + b.repaired });
+    (image, counts)
+}
+
+/// A place where a ray enters the mesh.
+struct Entry {
+    t: f64,
+    points: [u32; 3],
+    cell: u32,
+    face: Face,
+}
+
+/// What a ray has gathered.
+struct Gathered<const N: usize> {
+    light: Light<f32>,
+    largest: Option<[f32; N]>,
+}
+
+/// Traces rays, one after another.
+struct Tracer<'a, const N: usize> {
+    geometry: &'a Geometry,
+    values: &'a Values<N>,
+    exact: &'a Exact<f32>,
+    view: &'a View,
+    both_ways: bool,
+    candidates: Vec<Candidate>,
+    entries: Vec<Entry>,
+    counts: Counts,
+}
+
+impl<'a, const N: usize> Tracer<'a, N> {
+    fn new(geometry: &'a Geometry, values: &'a Values<N>, exact: &'a Exact<f32>, view: &'a View) -> Self {
+        let eye = (view.camera().position - geometry.centre) * geometry.scale;
+        let [low, high] = geometry.boundary.bounds();
+        let inside = eye.cmpge(low).all() && eye.cmple(high).all();
+        let both_ways = inside && matches!(view.camera().projection, Projection::Perspective { .. });
+        Tracer {
+            geometry,
+            values,
+            exact,
+            view,
+            both_ways,
+            candidates: vec![],
+            entries: vec![],
+            counts: Counts::default(),
+        }
+    }
+
+    /// Draws the tile whose upper left pixel is (`left`, `top`) into `rows`, which start with row `top` of the image.
+    fn tile(&mut self, left: u32, top: u32, rows: &mut [[f32; 4]], pixel: &(dyn Fn(&[f32; N]) -> [f32; 4] + Sync)) {
+        let w = self.view.size()[0];
+        let (right, bottom) = ((left + TILE).min(w), top + (rows.len() as u32 / w).min(TILE));
+        self.find_candidates([left, top], [right, bottom]);
+        if self.candidates.is_empty() {
+            return;
+        }
+        for j in top..bottom {
+            for i in left..right {
+                let gathered = self.trace(i, j);
+                rows[((j - top) * w + i) as usize] = match (self.view.blend(), gathered.largest) {
+                    (Blend::Composite, _) => {
+                        let Light { color: [r, g, b], through } = gathered.light;
+                        [r, g, b, 1.0 - through]
+                    }
+                    (Blend::Maximum, Some(values)) => pixel(&values),
+                    (Blend::Maximum, None) => [0.0; 4],
+                };
+            }
+        }
+    }
+
+    /// Collects the boundary faces that rays of the pixels `low..high` may enter through.
+    fn find_candidates(&mut self, low: [u32; 2], high: [u32; 2]) {
+        let Geometry { centre, scale, points, boundary, .. } = self.geometry;
+        let ([l, t], [r, b]) = (low.map(f64::from), high.map(f64::from));
+        // Rays pass through pixel centres, but an offset may move them.
+        let margin = 0.5 + self.view.pixel_offset().abs().max_element();
+        let rays = [(l, t), (r, t), (r, b), (l, b)].map(|(x, y)| {
+            let outward = |v: f64, low: f64| if v == low { v - margin } else { v + margin };
+            let ray = self.view.ray_through(outward(x, l), outward(y, t));
+            ((ray.origin - centre) * scale, ray.direction)
+        });
+        self.candidates.clear();
+        let beam = Beam::new(rays, self.both_ways);
+        let everywhere = [DVec2::NEG_INFINITY, DVec2::INFINITY];
+        boundary.for_each_in(&beam, |face| {
+            let corners = boundary.faces[face].points.map(|p| self.view.pixel(points[p as usize] / scale + centre));
+            let pixels = match corners {
+                [Some(a), Some(b), Some(c)] => [a.min(b).min(c) - margin, a.max(b).max(c) + margin],
+                _ => everywhere,
+            };
+            self.candidates.push(Candidate { face, pixels });
+        });
+    }
+
+    /// Traces the ray of pixel (`i`, `j`).
+    fn trace(&mut self, i: u32, j: u32) -> Gathered<N> {
+        let ray = self.view.ray(i, j);
+        let Geometry { centre, scale, .. } = *self.geometry;
+        let origin = (ray.origin - centre) * scale;
+        // From the point of the ray that is nearest to the middle of the mesh, so that no distance is great.
+        let start = -origin.dot(ray.direction);
+        let (t_min, t_max) = (ray.t_min * scale - start, ray.t_max * scale - start);
+        let straight = Frame::new(origin + ray.direction * start, ray.direction);
+        let none = || Gathered { light: Light::none(), largest: None };
+        if t_min.max(-4.0) >= t_max.min(4.0) {
+            return none();
+        }
+        let pixel = DVec2::new(f64::from(i) + 0.5, f64::from(j) + 0.5);
+        let mut frame = straight;
+        for attempt in 1..=3 {
+            let mut gathered = none();
+            if self.walk(&frame, pixel, [t_min, t_max], attempt == 3, &mut gathered) {
+                return gathered;
+            }
+            self.counts.repaired += u64::from(attempt == 1);
+            frame = straight.shifted(ASIDE * f64::from(attempt), ASIDE * 0.618 * f64::from(attempt));
+        }
+        none()
+    }
+
+    /// Follows one ray; false if it passed too close to an edge of the boundary, unless `anyhow`.
+    fn walk(
+        &mut self,
+        frame: &Frame,
+        pixel: DVec2,
+        [t_min, t_max]: [f64; 2],
+        anyhow: bool,
+        gathered: &mut Gathered<N>,
+    ) -> bool {
+        if !self.find_entries(frame, pixel) && !anyhow {
+            return false;
+        }
+        for e in 0..self.entries.len() {
+            if self.entries[e].t >= t_max || gathered.light.through < NEGLIGIBLE {
+                break;
+            }
+            let exit = self.follow(frame, e, [t_min, t_max], gathered);
+            if exit.is_some_and(is_close) && !anyhow {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// Collects where the ray enters the mesh, in order; false if any of it is too close to an edge.
+    fn find_entries(&mut self, frame: &Frame, pixel: DVec2) -> bool {
+        let Geometry { points, boundary, .. } = self.geometry;
+        let mut clear = true;
+        self.entries.clear();
+        for c in &self.candidates {
+            if pixel.cmplt(c.pixels[0]).any() || pixel.cmpgt(c.pixels[1]).any() {
+                continue;
+            }
+            let outer = &boundary.faces[c.face];
+            let [a, b, c] = outer.points;
+            // Seen along a ray that enters, the face turns clockwise: its mirror image does not.
+            let Some(face) = Face::enter([a, c, b].map(|p| frame.project(points[p as usize]))) else { continue };
+            let weights = face.weights();
+            clear &= !is_close(weights);
+            self.entries.push(Entry { t: face.t(&weights), points: [a, c, b], cell: outer.cell, face });
+        }
+        self.entries.sort_unstable_by(|a, b| a.t.total_cmp(&b.t).then(a.points.cmp(&b.points)));
+        clear
+    }
+
+    /// Walks from entry `e` until the ray leaves the mesh or ends; the weights at the exit in the first case.
+    fn follow(
+        &mut self,
+        frame: &Frame,
+        e: usize,
+        [t_min, t_max]: [f64; 2],
+        gathered: &mut Gathered<N>,
+    ) -> Option<[f64; 3]> {
+        let Geometry { points, cells, .. } = self.geometry;
+        let Entry { t, points: mut ids, mut cell, mut face } = self.entries[e];
+        let (mut t, mut reached, mut weights) = (t, t_min, face.weights());
+        let mut front = self.value(cell, &ids, &weights);
+        loop {
+            self.counts.steps += 1;
+            let Some(c) = cells.get(cell as usize) else { return None };
+            let apex = c.corners.iter().fold(ids[0] ^ ids[1] ^ ids[2], |x, p| x ^ p);
+            let dropped = face.step(frame.project(points[apex as usize]));
+            let left_behind = std::mem::replace(&mut ids[dropped], apex);
+            if !matches!(self.values, Values::Point(_)) {
+                front = self.value(cell, &ids_before(ids, dropped, left_behind), &weights);
+            }
+            weights = face.weights();
+            let (entered, left) = (t, face.t(&weights));
+            let back = self.value(cell, &ids, &weights);
+            if left > reached {
+                let (from, to) = (entered.max(reached), left.min(t_max));
+                if from < to {
+                    let at = |x: f64| {
+                        if x == entered {
+                            front
+                        } else if x == left {
+                            back
+                        } else {
+                            mix(&front, &back, ((x - entered) / (left - entered)) as f32)
+                        }
+                    };
+                    self.gather(at(from), at(to), to - from, gathered);
+                }
+                reached = left;
+                if reached >= t_max || gathered.light.through < NEGLIGIBLE {
+                    return None;
+                }
+            }
+            (t, front) = (left, back);
+            let k = c.corners.iter().position(|&p| p == left_behind).unwrap_or(0);
+            cell = c.neighbours[k];
+            if cell == BOUNDARY {
+                return Some(weights);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn gather(&self, front: [f32; N], back: [f32; N], length: f64, gathered: &mut Gathered<N>) {
+        if self.view.blend() == Blend::Composite {
+            self.exact.add(&front, &back, length as f32, &mut gathered.light);
+        } else if front.iter().chain(&back).all(|v| v.is_finite()) {
+            for v in [front, back] {
+                if gathered.largest.is_none_or(|l| v[N - 1] > l[N - 1]) {
+                    gathered.largest = Some(v);
+                }
+            }
+        }
+    }
+
+    /// The field at `weights` on the face `ids` of `cell`.
+    #[inline(always)]
+    fn value(&self, cell: u32, ids: &[u32; 3], weights: &[f64; 3]) -> [f32; N] {
+        let corners: [&[f32; N]; 3] = match self.values {
+            Values::Cell(v) => return v[cell as usize],
+            Values::Point(v) => ids.map(|p| &v[p as usize]),
+            Values::Corner(v) => {
+                let own = &self.geometry.cells[cell as usize].corners;
+                ids.map(|p| &v[cell as usize][own.iter().position(|&c| c == p).unwrap_or(0)])
+            }
+        };
+        std::array::from_fn(|k| (0..3).map(|i| f64::from(corners[i][k]) * weights[i]).sum::<f64>() as f32)
+    }
+}
+
+fn is_close(weights: [f64; 3]) -> bool {
+    weights.iter().any(|w| *w < TOO_CLOSE)
+}
+
+fn ids_before(mut ids: [u32; 3], dropped: usize, left_behind: u32) -> [u32; 3] {
+    ids[dropped] = left_behind;
+    ids
+}
+
+fn mix<const N: usize>(a: &[f32; N], b: &[f32; N], w: f32) -> [f32; N] {
+    std::array::from_fn(|k| a[k] + (b[k] - a[k]) * w)
+}

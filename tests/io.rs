@@ -1,0 +1,706 @@
+//! The reader of mesh files: what writers write is read as it was meant, what is damaged is refused by name.
+
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
+use halite::mesh::{Array, Mesh, Values};
+use halite::{Error, Result};
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+/// Reads bytes as if they were a file of that name, and checks what `progress` is told.
+fn read_as(name: &str, bytes: &[u8]) -> Result<Mesh> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    std::fs::write(&path, bytes).unwrap();
+    let last = Mutex::new(0.0);
+    let mesh = halite::io::open(&path, &|share| {
+        let mut last = last.lock().unwrap();
+        assert!(share >= *last && share <= 1.0, "the share went from {last} to {share}");
+        *last = share;
+    });
+    assert!(mesh.is_err() || *last.lock().unwrap() == 1.0);
+    mesh
+}
+
+fn read(bytes: &[u8]) -> Result<Mesh> {
+    read_as("mesh.vtu", bytes)
+}
+
+/// The message of a damaged file, which must be of the right kind and name the file.
+fn malformed(bytes: &[u8]) -> String {
+    match read(bytes) {
+        Err(Error::Malformed { path, what }) if path.ends_with("mesh.vtu") => what,
+        other => panic!("not refused as malformed: {other:?}"),
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Mode {
+    Ascii,
+    Inline,
+    AppendedBase64,
+    AppendedRaw,
+}
+
+/// How a file is written.
+#[derive(Debug, Clone, Copy)]
+struct Style {
+    mode: Mode,
+    big_endian: bool,
+    wide: bool,
+    /// Bytes per zlib block.
+    block: Option<usize>,
+    /// Header and data of uncompressed base64 in one piece, as VTK does, or each on its own, as FEniCS does.
+    together: bool,
+}
+
+const PLAIN: Style = Style { mode: Mode::Ascii, big_endian: false, wide: false, block: None, together: true };
+
+macro_rules! bytes_of {
+    ($v:expr, $big:expr) => {
+        $v.iter().flat_map(|x| if $big { x.to_be_bytes().to_vec() } else { x.to_le_bytes().to_vec() }).collect()
+    };
+}
+
+/// Type name, bytes and text of values.
+fn told(values: &Values, big: bool) -> (&'static str, Vec<u8>, String) {
+    macro_rules! arms {
+        ($($variant:ident $name:literal),*) => {
+            match values {
+                $(Values::$variant(v) => ($name, bytes_of!(v, big), v.iter().map(|x| format!(" {x}")).collect())),*
+            }
+        };
+    }
+    arms!(I8 "Int8", U8 "UInt8", I16 "Int16", U16 "UInt16", I32 "Int32", U32 "UInt32", I64 "Int64", U64 "UInt64",
+        F32 "Float32", F64 "Float64")
+}
+
+fn zlib(bytes: &[u8]) -> Vec<u8> {
+    let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::default());
+    encoder.write_all(bytes).unwrap();
+    encoder.finish().unwrap()
+}
+
+impl Style {
+    fn words(&self, words: &[usize]) -> Vec<u8> {
+        match self.wide {
+            true => bytes_of!(words.iter().map(|w| *w as u64).collect::<Vec<_>>(), self.big_endian),
+            false => bytes_of!(words.iter().map(|w| *w as u32).collect::<Vec<_>>(), self.big_endian),
+        }
+    }
+
+    /// Header and body of an array.
+    fn parts(&self, bytes: &[u8]) -> (Vec<u8>, Vec<u8>) {
+        let Some(block) = self.block else { return (self.words(&[bytes.len()]), bytes.to_vec()) };
+        let blocks: Vec<Vec<u8>> = bytes.chunks(block).map(zlib).collect();
+        let mut head = vec![blocks.len(), block, bytes.len() % block];
+        head.extend(blocks.iter().map(Vec::len));
+        (self.words(&head), blocks.concat())
+    }
+
+    fn encoded(&self, bytes: &[u8]) -> Vec<u8> {
+        let (head, body) = self.parts(bytes);
+        match self.mode {
+            Mode::AppendedRaw => [head, body].concat(),
+            _ if self.together && self.block.is_none() => BASE64_STANDARD.encode([head, body].concat()).into_bytes(),
+            _ => (BASE64_STANDARD.encode(head) + &BASE64_STANDARD.encode(body)).into_bytes(),
+        }
+    }
+}
+
+/// A piece to be written: points as an array, cells as arrays of any type, data.
+#[derive(Clone)]
+struct Piece {
+    points: Values,
+    connectivity: Values,
+    offsets: Values,
+    types: Values,
+    point_data: Vec<Array>,
+    cell_data: Vec<Array>,
+}
+
+fn array(name: &str, components: usize, values: Values) -> Array {
+    Array { name: name.to_owned(), components, values }
+}
+
+/// A tetrahedron and a wedge that share no point, and enough values to fill several blocks.
+fn piece() -> Piece {
+    Piece {
+        points: Values::F64((0..30).map(|i| f64::from(i * i % 17) * 0.375 - 1.0).collect()),
+        connectivity: Values::I64((0..10).collect()),
+        offsets: Values::I64(vec![4, 10]),
+        types: Values::U8(vec![10, 13]),
+        point_data: vec![
+            array("T", 1, Values::F32((0..10u8).map(|i| f32::from(i) * 0.125).collect())),
+            array("v", 9, Values::F64((0..90).map(|i| f64::from(i).sqrt()).collect())),
+        ],
+        cell_data: vec![array("id", 1, Values::I32(vec![-7, 1 << 30]))],
+    }
+}
+
+fn write(style: Style, pieces: &[Piece]) -> Vec<u8> {
+    let mut appended: Vec<u8> = Vec::new();
+    let mut head = String::from("<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"0.1\"");
+    write!(head, " byte_order=\"{}Endian\"", if style.big_endian { "Big" } else { "Little" }).unwrap();
+    write!(head, " header_type=\"UInt{}\"", if style.wide { 64 } else { 32 }).unwrap();
+    head += if style.block.is_some() { " compressor=\"vtkZLibDataCompressor\"" } else { "" };
+    head += ">\n<UnstructuredGrid>\n";
+    for piece in pieces {
+        let (points, cells) = (piece.points.len() / 3, piece.types.len());
+        writeln!(head, "<Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{cells}\">").unwrap();
+        let topology = vec![
+            array("connectivity", 1, piece.connectivity.clone()),
+            array("offsets", 1, piece.offsets.clone()),
+            array("types", 1, piece.types.clone()),
+        ];
+        let sections = [
+            ("PointData", piece.point_data.clone()),
+            ("CellData", piece.cell_data.clone()),
+            ("Points", vec![array("Points", 3, piece.points.clone())]),
+            ("Cells", topology),
+        ];
+        for (section, arrays) in sections {
+            writeln!(head, "<{section}>").unwrap();
+            for Array { name, components, values } in arrays {
+                let (kind, bytes, text) = told(&values, style.big_endian);
+                write!(head, "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" ")
+                    .unwrap();
+                match style.mode {
+                    Mode::Ascii => writeln!(head, "format=\"ascii\">\n{text}\n</DataArray>").unwrap(),
+                    Mode::Inline => {
+                        let text = String::from_utf8(style.encoded(&bytes)).unwrap();
+                        writeln!(head, "format=\"binary\">\n   {text}\n  </DataArray>").unwrap();
+                    }
+                    Mode::AppendedBase64 | Mode::AppendedRaw => {
+                        writeln!(head, "format=\"appended\" offset=\"{}\"/>", appended.len()).unwrap();
+                        appended.extend(style.encoded(&bytes));
+                    }
+                }
+            }
+            writeln!(head, "</{section}>").unwrap();
+        }
+        head += "</Piece>\n";
+    }
+    head += "</UnstructuredGrid>\n";
+    let mut file = head.into_bytes();
+    if matches!(style.mode, Mode::AppendedRaw | Mode::AppendedBase64) {
+        let encoding = if style.mode == Mode::AppendedRaw { "raw" } else { "base64" };
+        file.extend(format!("<AppendedData encoding=\"{encoding}\">\n   _").bytes());
+        file.extend(appended);
+        file.extend(b"\n</AppendedData>\n");
+    }
+    file.extend(b"</VTKFile>\n");
+    file
+}
+
+fn ascii(pieces: &[Piece]) -> String {
+    String::from_utf8(write(PLAIN, pieces)).unwrap()
+}
+
+fn floats(values: &Values) -> Vec<f64> {
+    (0..values.len()).map(|i| values.get(i)).collect()
+}
+
+fn coordinates(mesh: &Mesh) -> Vec<f64> {
+    mesh.points().iter().flat_map(|p| p.to_array()).collect()
+}
+
+fn assert_holds(mesh: &Mesh, piece: &Piece, what: impl std::fmt::Debug) {
+    assert_eq!(coordinates(mesh), floats(&piece.points), "{what:?}");
+    assert_eq!(mesh.cells().types, [10, 13], "{what:?}");
+    assert_eq!(mesh.cells().offsets, [0, 4, 10], "{what:?}");
+    assert_eq!(mesh.cells().connectivity, [0, 1, 2, 3, 4, 5, 6, 7, 8, 9], "{what:?}");
+    assert_eq!(mesh.point_arrays(), piece.point_data, "{what:?}");
+    assert_eq!(mesh.cell_arrays(), piece.cell_data, "{what:?}");
+}
+
+/// Every way to write a file that is read. Blocks of 72 bytes hold whole numbers of any type and end with the array "v", those of
+/// 100 bytes do not, and those of 50 bytes cut numbers in two.
+fn styles() -> Vec<Style> {
+    let mut styles = Vec::new();
+    for mode in [Mode::Ascii, Mode::Inline, Mode::AppendedBase64, Mode::AppendedRaw] {
+        for big_endian in [false, true] {
+            for wide in [false, true] {
+                for block in [Some(72), Some(100), Some(50), Some(1 << 15)] {
+                    styles.push(Style { mode, big_endian, wide, block, together: false });
+                }
+                for together in [true, false] {
+                    styles.push(Style { mode, big_endian, wide, block: None, together });
+                }
+            }
+        }
+    }
+    styles
+}
+
+#[test]
+fn every_encoding() {
+    for style in styles() {
+        assert_holds(&read(&write(style, &[piece()])).unwrap(), &piece(), style);
+    }
+}
+
+/// vtkio cannot read raw appended data, base64 in parts and blocks that cut numbers, and drops arrays whose last block is full. It
+/// must find in the other files what Halite finds.
+#[test]
+fn vtkio_agrees() {
+    use vtkio::model::{Attribute, DataSet, Piece::Inline, VertexNumbers};
+    let read_by_both = |s: &Style| s.mode != Mode::AppendedRaw && s.block.map_or(s.together, |block| block == 1 << 15);
+    for style in styles().into_iter().filter(read_by_both) {
+        let bytes = write(style, &[piece()]);
+        let mesh = read(&bytes).unwrap();
+        let DataSet::UnstructuredGrid { pieces, .. } = vtkio::Vtk::parse_xml(&bytes[..]).unwrap().data else {
+            panic!()
+        };
+        let Inline(other) = &pieces[0] else { panic!() };
+        assert_eq!(other.points.cast_into::<f64>().unwrap(), coordinates(&mesh), "{style:?}");
+        let VertexNumbers::XML { connectivity, offsets } = other.cells.cell_verts.clone() else { panic!() };
+        assert_eq!(offsets, mesh.cells().offsets[1..], "{style:?}");
+        assert_eq!(
+            connectivity,
+            mesh.cells().connectivity.iter().map(|p| u64::from(*p)).collect::<Vec<_>>(),
+            "{style:?}"
+        );
+        for (theirs, ours) in [(&other.data.point, mesh.point_arrays()), (&other.data.cell, mesh.cell_arrays())] {
+            assert_eq!(theirs.len(), ours.len(), "{style:?}");
+            for (theirs, ours) in theirs.iter().zip(ours) {
+                let Attribute::DataArray(theirs) = theirs else { panic!() };
+                assert_eq!(theirs.name, ours.name);
+                assert_eq!(theirs.data.cast_into::<f64>().unwrap(), floats(&ours.values), "{style:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn every_number_type() {
+    let data = |n: usize| {
+        vec![
+            array("i8", 1, Values::I8([i8::MIN, -1, 0, i8::MAX].repeat(3)[..n].to_vec())),
+            array("u8", 1, Values::U8([u8::MIN, 1, 2, u8::MAX].repeat(3)[..n].to_vec())),
+            array("i16", 1, Values::I16([i16::MIN, -1, 0, i16::MAX].repeat(3)[..n].to_vec())),
+            array("u16", 1, Values::U16([u16::MIN, 1, 2, u16::MAX].repeat(3)[..n].to_vec())),
+            array("i32", 1, Values::I32([i32::MIN, -1, 0, i32::MAX].repeat(3)[..n].to_vec())),
+            array("u32", 1, Values::U32([u32::MIN, 1, 2, u32::MAX].repeat(3)[..n].to_vec())),
+            array("i64", 1, Values::I64([i64::MIN, -1, 0, i64::MAX].repeat(3)[..n].to_vec())),
+            array("u64", 1, Values::U64([u64::MIN, 1, 2, u64::MAX].repeat(3)[..n].to_vec())),
+            array("f32", 1, Values::F32([f32::MIN, -0.1, f32::MIN_POSITIVE, f32::INFINITY].repeat(3)[..n].to_vec())),
+            array("f64", 1, Values::F64([f64::MIN, -0.1, 5e-324, f64::NEG_INFINITY].repeat(3)[..n].to_vec())),
+        ]
+    };
+    let piece = Piece { point_data: data(10), cell_data: data(2), ..piece() };
+    for style in styles() {
+        assert_holds(&read(&write(style, std::slice::from_ref(&piece))).unwrap(), &piece, style);
+    }
+}
+
+#[test]
+fn cells_of_every_integer_type() {
+    let whole = |values: &[u8]| {
+        [
+            Values::I8(values.iter().map(|v| *v as i8).collect()),
+            Values::U8(values.to_vec()),
+            Values::I16(values.iter().map(|v| i16::from(*v)).collect()),
+            Values::U16(values.iter().map(|v| u16::from(*v)).collect()),
+            Values::I32(values.iter().map(|v| i32::from(*v)).collect()),
+            Values::U32(values.iter().map(|v| u32::from(*v)).collect()),
+            Values::I64(values.iter().map(|v| i64::from(*v)).collect()),
+            Values::U64(values.iter().map(|v| u64::from(*v)).collect()),
+        ]
+    };
+    let connectivity = whole(&[0, 1, 2, 3, 4, 5, 6, 7, 8, 9]);
+    for ((connectivity, offsets), types) in connectivity.into_iter().zip(whole(&[4, 10])).zip(whole(&[10, 13])) {
+        let piece = Piece { connectivity, offsets, types, ..piece() };
+        for mode in [Mode::Ascii, Mode::AppendedRaw] {
+            let bytes = write(Style { mode, ..PLAIN }, std::slice::from_ref(&piece));
+            assert_holds(&read(&bytes).unwrap(), &piece, mode);
+        }
+    }
+}
+
+#[test]
+fn pieces_become_one_mesh() {
+    let empty = Piece {
+        points: Values::F32(vec![]),
+        connectivity: Values::I32(vec![]),
+        offsets: Values::I32(vec![]),
+        types: Values::U8(vec![]),
+        point_data: vec![],
+        cell_data: vec![],
+    };
+    let mut second = piece();
+    second.point_data = vec![
+        array("v", 1, Values::F64(vec![0.5; 10])),
+        array("T", 1, Values::I8((0..10).collect())),
+        array("only here", 1, Values::I8((0..10).collect())),
+    ];
+    second.cell_data.insert(0, array("id", 1, Values::I32(vec![3, 4])));
+    for mode in [Mode::Ascii, Mode::AppendedRaw] {
+        let style = Style { mode, ..PLAIN };
+        let mesh = read(&write(style, &[empty.clone(), piece(), second.clone(), empty.clone()])).unwrap();
+        assert_eq!((mesh.points().len(), mesh.cells().len()), (20, 4));
+        assert_eq!(mesh.points()[..10], mesh.points()[10..]);
+        assert_eq!(mesh.cells().offsets, [0, 4, 10, 14, 20]);
+        assert_eq!(mesh.cells().points(2), [10, 11, 12, 13]);
+        let ids = Values::I32(vec![-7, 1 << 30, 3, 4]);
+        assert_eq!(mesh.cell_arrays(), [array("id", 1, ids)], "the first of the name; not every piece has a second");
+        assert_eq!(mesh.point_arrays().len(), 1, "\"v\" has other components in the second piece");
+        let t = &mesh.point_arrays()[0];
+        assert!(matches!(t.values, Values::F64(_)), "of two types");
+        assert_eq!((t.values.get(1), t.values.get(19)), (0.125, 9.0));
+    }
+    let nothing = read(&write(PLAIN, &[empty])).unwrap();
+    assert_eq!((nothing.points().len(), nothing.cells().len()), (0, 0));
+    let mut bad = second;
+    bad.connectivity = Values::I8(vec![0, 1, 2, 3, 4, 5, 6, 7, 8, 10]);
+    let what = malformed(&write(PLAIN, &[piece(), bad]));
+    assert!(what.contains("\"connectivity\" of piece 1: cell 1 names point 10, but there are 10"), "{what}");
+}
+
+#[test]
+fn spellings_of_xml() {
+    let text = ascii(&[piece()]);
+    let same = |text: &str| assert_holds(&read(text.as_bytes()).unwrap(), &piece(), text);
+    same(&text.replace('"', "'"));
+    same(&text.replace("<?xml version=\"1.0\"?>\n", ""));
+    same(&format!("\u{feff}{}", text.replace('\n', "\r\n")));
+    same(&text.replace("<VTKFile", "<!-- <VTKFile> -->\n<VTKFile").replace("<Points>", "<!-- a > b & c --><Points>"));
+    same(&text.replace(" byte_order=\"LittleEndian\" header_type=\"UInt32\"", ""));
+    same(&text.replace("<Piece", "<FieldData><DataArray type='Float128' Name='x'>a & b</DataArray></FieldData><Piece"));
+    same(&text.replace("<CellData>", "<CellData><DataArray type='String' Name='s' format='ascii'>65 0</DataArray>"));
+    same(&text.replace("<CellData>", "<CellData><DataArray type='Bit' Name='b' format='ascii'>1 0</DataArray>"));
+    same(&text.replace("<CellData>", "<CellData><Array type='String' Name='s' format='appended' offset='7'/>"));
+    same(&text.replace("\n</DataArray>", "<!-- end --><InformationKey>9 9</InformationKey></DataArray>"));
+    same(&text.replace("NumberOfComponents=\"1\" format=\"ascii\"", "NumberOfComponents=\"\""));
+    same(&text.replace(" 4 10\n", " 4.0e0 10.\n"));
+    for mode in [Mode::AppendedBase64, Mode::AppendedRaw] {
+        let with_mark = [b"\xef\xbb\xbf".to_vec(), write(Style { mode, ..PLAIN }, &[piece()])].concat();
+        assert_holds(&read(&with_mark).unwrap(), &piece(), "byte order mark");
+    }
+    let named = |name: &str| {
+        let text = text.replace("Name=\"T\"", &format!("Name=\"{name}\""));
+        read(text.as_bytes()).unwrap().point_arrays()[0].name.clone()
+    };
+    assert_eq!(named("p &lt; q &amp;&#x20;&quot;r&quot;"), "p < q & \"r\"");
+    assert_eq!(named("a<b & c"), "a<b & c", "as VTK itself writes it");
+    assert_eq!(named("a > b"), "a > b");
+    assert_eq!(named("Druck p/p₀"), "Druck p/p₀");
+}
+
+#[test]
+fn ascii_numbers_of_other_programs() {
+    let values = " nan -NaN inf -Infinity 1.#QNAN -1.#IND00 1.#INF nan(0x8) +1e3 .5\n";
+    let text = ascii(&[piece()]).replace(" 0 0.125 0.25 0.375 0.5 0.625 0.75 0.875 1 1.125\n", values);
+    assert!(text.contains("IND"));
+    let t = floats(&read(text.as_bytes()).unwrap().point_arrays()[0].values);
+    assert_eq!(t.iter().map(|v| v.is_nan()).collect::<Vec<_>>(), [1, 1, 0, 0, 1, 1, 0, 1, 0, 0].map(|b| b == 1));
+    assert_eq!((t[2], t[3], t[6], t[8], t[9]), (f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY, 1000.0, 0.5));
+}
+
+/// Long ascii arrays are parsed in parts, long binary ones in chunks.
+#[test]
+fn long_arrays() {
+    let n = 40_000;
+    let long = Piece {
+        point_data: vec![array("f", 1, Values::F64((0..n).map(f64::from).collect()))],
+        points: Values::F32((0..3 * n).map(|i| i as f32).collect()),
+        ..piece()
+    };
+    for mode in [Mode::Ascii, Mode::Inline, Mode::AppendedBase64, Mode::AppendedRaw] {
+        let mesh = read(&write(Style { mode, ..PLAIN }, std::slice::from_ref(&long))).unwrap();
+        assert_holds(&mesh, &long, mode);
+    }
+    let packed = Style { mode: Mode::AppendedBase64, block: Some(10_001), ..PLAIN };
+    assert_holds(&read(&write(packed, std::slice::from_ref(&long))).unwrap(), &long, packed);
+}
+
+/// Raw data is not XML: bytes that look like tags must not end it.
+#[test]
+fn raw_data_may_look_like_xml() {
+    let mut piece = piece();
+    let trap = b"_</AppendedData></VTKFile><Piece NumberOfPoints=\"9\"><!-- <![CDATA[ ";
+    piece.cell_data.push(array("trap", 33, Values::U8(trap[..66].to_vec())));
+    let bytes = write(Style { mode: Mode::AppendedRaw, ..PLAIN }, std::slice::from_ref(&piece));
+    assert_holds(&read(&bytes).unwrap(), &piece, "trap");
+}
+
+#[test]
+fn base64_in_lines() {
+    let text = String::from_utf8(write(Style { mode: Mode::Inline, ..PLAIN }, &[piece()])).unwrap();
+    let broken = |line: &str| match line.starts_with("   ") {
+        true => line.as_bytes().chunks(76).map(|c| std::str::from_utf8(c).unwrap()).collect::<Vec<_>>().join("\r\n"),
+        false => line.to_owned(),
+    };
+    let text: String = text.lines().map(broken).collect::<Vec<_>>().join("\n");
+    assert_holds(&read(text.as_bytes()).unwrap(), &piece(), "lines");
+}
+
+/// GetFEM states a wrong length in its point data; VTK takes the numbers that it needs.
+#[test]
+fn data_with_more_bytes_than_numbers() {
+    let bytes = write(Style { mode: Mode::AppendedRaw, ..PLAIN }, &[piece()]);
+    let start = bytes.windows(2).position(|w| w == b" _").unwrap() + 2;
+    let stated = |value: u32| [&bytes[..start], &value.to_le_bytes(), &bytes[start + 4..]].concat();
+    assert_holds(&read(&stated(0x42fa_0000)).unwrap(), &piece(), "too many");
+    assert!(malformed(&stated(39)).contains("PointData array \"T\": it holds 39 bytes, but its numbers need 40"));
+}
+
+#[test]
+fn damage_is_named() {
+    let text = ascii(&[piece()]);
+    let told = |from: &str, to: &str, expected: &str| {
+        assert!(text.contains(from), "{from}");
+        let what = malformed(text.replacen(from, to, 1).as_bytes());
+        assert!(what.contains(expected), "\"{from}\" -> \"{to}\" says: {what}");
+    };
+    let connectivity = " 0 1 2 3 4 5 6 7 8 9\n";
+    told(connectivity, " 0 1 2 3 10 5 6 7 8 9\n", "cell 1 names point 10, but there are 10 points");
+    told(connectivity, " 0 1 -2 3 4 5 6 7 8 9\n", "cell 0 names a negative point");
+    told(connectivity, " 0 1 2x 3 4 5 6 7 8 9\n", "Cells array \"connectivity\": \"2x\" is not a number");
+    told(connectivity, " 0 1 2.5 3 4 5 6 7 8 9\n", "\"2.5\" is not a number");
+    told(connectivity, " 0 1 2 3 4 5 6 7 8\n", "\"connectivity\": it holds 9 numbers, not 10");
+    told(" 4 10\n", " 4 -10\n", "offset of cell 1");
+    told(" 4 10\n", " 40 10\n", "the offsets decrease at cell 1");
+    told(" 4 10\n", " 4 9223372036854775807\n", "it holds 10 numbers, not 9223372036854775807");
+    told(" 10 13\n", " 10 256\n", "Cells array \"types\": \"256\" is not a number of its type");
+    told("NumberOfPoints=\"10\"", "NumberOfPoints=\"11\"", "numbers, not");
+    told("NumberOfPoints=\"10\"", "NumberOfPoints=\"9\"", "numbers, not");
+    told("NumberOfPoints=\"10\"", "NumberOfPoints=\"300000000\"", "numbers, not");
+    told("NumberOfPoints=\"10\"", "NumberOfPoints=\"-1\"", "NumberOfPoints is \"-1\", not a count");
+    told("NumberOfPoints=\"10\"", "", "a <Piece> has no NumberOfPoints");
+    told("NumberOfCells=\"2\"", "NumberOfCells=\"3\"", "numbers, not");
+    told(
+        "Name=\"Points\" NumberOfComponents=\"3\"",
+        "NumberOfComponents=\"2\"",
+        "the Points of piece 0 have 2 components",
+    );
+    told("<Points>", "<Pints>", "XML");
+    told("Name=\"types\"", "Name=\"typos\"", "the Cells of piece 0 have no array \"types\"");
+    told("type=\"Float32\"", "type=\"Float16\"", "PointData array \"T\": its type is \"Float16\"");
+    told("LittleEndian", "MiddleEndian", "byte_order is \"MiddleEndian\"");
+    told("UInt32", "UInt24", "header_type is \"UInt24\"");
+    told("format=\"ascii\"", "format=\"morse\"", "its format is \"morse\"");
+    told("format=\"ascii\"", "format=\"appended\"", "no offset");
+    told("format=\"ascii\"", "format=\"appended\" offset=\"0\"", "no <AppendedData>");
+    told("<VTKFile", "<html", "<html>");
+    for part in ["</Piece>", "<Piece", "<DataArray", "NumberOfComponents", "</VTKFile>"] {
+        let cut = malformed(&text.as_bytes()[..text.find(part).unwrap() + 3]);
+        assert!(cut.contains("cut short") || cut.contains("XML"), "{part}: {cut}");
+    }
+    assert!(malformed(b"").contains("empty"));
+    assert!(malformed(b"\x7fELF\0\0").contains("neither"));
+    assert!(malformed(b"<VTKFile type='UnstructuredGrid'><UnstructuredGrid/></VTKFile>").contains("no <Piece>"));
+    let wide_types = Piece { types: Values::I16(vec![10, 256]), ..piece() };
+    assert!(malformed(&write(PLAIN, &[wide_types])).contains("the type of cell 1 is not in 0..=255"));
+    assert!(matches!(halite::io::open(Path::new("no/such.vtu"), &|_| ()), Err(Error::File { .. })));
+}
+
+/// No size that a file merely states may make the reader take memory, wait or panic.
+#[test]
+fn lies_about_sizes() {
+    let style = Style { mode: Mode::AppendedRaw, wide: true, block: Some(64), ..PLAIN };
+    // The first array, "T", has one block.
+    let first = |word: usize, value: u64| {
+        let mut bytes = write(style, &[piece()]);
+        let start = bytes.windows(2).position(|w| w == b" _").unwrap() + 2 + 8 * word;
+        bytes[start..start + 8].copy_from_slice(&value.to_le_bytes());
+        let what = malformed(&bytes);
+        assert!(what.contains("PointData array \"T\""), "{what}");
+        what
+    };
+    assert!(first(0, 1 << 60).contains("1152921504606846976 blocks"));
+    assert!(first(0, u64::MAX).contains("blocks"));
+    assert!(first(0, 0).contains("it holds 0 bytes"));
+    assert!(first(2, 1 << 62).contains("cannot unpack"));
+    assert!(first(2, 39).contains("it holds 39 bytes"));
+    assert!(first(3, 1 << 62).contains("the file ends after"));
+    assert!(first(3, 3).contains("block 0 is not valid zlib"));
+    let text = String::from_utf8(write(Style { mode: Mode::AppendedBase64, ..PLAIN }, &[piece()])).unwrap();
+    let far = text.replace("offset=\"60\"", "offset=\"99999999\"");
+    assert!(malformed(far.as_bytes()).contains("PointData array \"v\": its offset 99999999 lies past the end"));
+    let counts = [(u64::MAX, 2), (10, u64::MAX), (u64::MAX / 24, 2), (u64::from(u32::MAX) - 1, u64::MAX / 8)];
+    for (points, cells) in counts {
+        for style in [style, Style { block: None, ..style }, Style { mode: Mode::Inline, ..style }, PLAIN] {
+            let mut bytes = write(style, &[piece()]);
+            let text = b"NumberOfPoints=\"10\" NumberOfCells=\"2\"";
+            let at = bytes.windows(text.len()).position(|w| w == text).unwrap();
+            let lie = format!("NumberOfPoints=\"{points}\" NumberOfCells=\"{cells}\"");
+            bytes.splice(at..at + text.len(), lie.into_bytes());
+            assert!(read(&bytes).is_err());
+        }
+    }
+}
+
+#[test]
+fn hostile_xml() {
+    let deep = format!("<VTKFile type='UnstructuredGrid'>{}", "<a>".repeat(200_000));
+    assert!(malformed(deep.as_bytes()).contains("cut short"));
+    let bomb = "<?xml version='1.0'?><!DOCTYPE V [<!ENTITY a 'aaaaaaaaaa'><!ENTITY b '&a;&a;&a;&a;&a;'>]>\
+        <VTKFile type='UnstructuredGrid'><UnstructuredGrid><Piece NumberOfPoints='&b;' NumberOfCells='0'/>";
+    assert!(malformed(bomb.as_bytes()).contains("NumberOfPoints is \"&b;\""));
+}
+
+#[test]
+fn what_is_not_read_is_refused_by_name() {
+    let refused = |name: &str, bytes: &[u8]| match read_as(name, bytes) {
+        Err(Error::Unsupported { what, .. }) => what,
+        other => panic!("{name}: {other:?}"),
+    };
+    let style = Style { mode: Mode::Inline, block: Some(64), ..PLAIN };
+    let text = String::from_utf8(write(style, &[piece()])).unwrap();
+    for compressor in ["vtkLZ4DataCompressor", "vtkLZMADataCompressor"] {
+        let what = refused("mesh.vtu", text.replace("vtkZLibDataCompressor", compressor).as_bytes());
+        assert!(what.contains(compressor) && what.contains("array \""), "{what}");
+        let unused = ascii(&[piece()]).replace("UInt32\">", &format!("UInt32\" compressor=\"{compressor}\">"));
+        assert_holds(&read(unused.as_bytes()).unwrap(), &piece(), "a compressor that nothing uses");
+    }
+    for kind in ["PUnstructuredGrid", "ImageData", "PolyData", "Collection", "vtkMultiBlockDataSet", "Nonsense"] {
+        assert!(refused("mesh.vtu", format!("<VTKFile type='{kind}'/>").as_bytes()).contains(kind));
+    }
+    for extension in ["vti", "pvd", "vtm", "vtkhdf", "pvtu", "VTP"] {
+        assert!(refused(&format!("mesh.{extension}"), b"\x89HDF").starts_with("this is "));
+    }
+    let points = "DATASET STRUCTURED_POINTS\nDIMENSIONS 1 1 1\nORIGIN 0 0 0\nSPACING 1 1 1\n";
+    let what = refused("mesh.vtk", format!("# vtk DataFile Version 3.0\nx\nASCII\n{points}").as_bytes());
+    assert!(what.contains("ImageData"), "{what}");
+}
+
+const LEGACY: &str = "# vtk DataFile Version 3.0\ntitle\nASCII\nDATASET UNSTRUCTURED_GRID\n\
+    POINTS 5 float\n0 0 0 1 0 0 0 1 0 0 0 1\n1 1 1\nCELLS 2 10\n4 0 1 2 3\n4 1 2 3 4\nCELL_TYPES 2\n10 10\n\
+    CELL_DATA 2\nSCALARS id int 1\nLOOKUP_TABLE default\n7 8\n\
+    POINT_DATA 5\nVECTORS v%20x double\n0 0 0 0 0 1 0 1 0 0 1 1 2 2 2\nFIELD FieldData 1\nT 1 5 float\n1 2 3 4 5\n";
+
+#[test]
+fn legacy_files() {
+    let mesh = read_as("mesh.vtk", LEGACY.as_bytes()).unwrap();
+    assert_eq!((mesh.points().len(), mesh.cells().types.as_slice()), (5, &[10, 10][..]));
+    assert_eq!(mesh.cells().points(1), [1, 2, 3, 4]);
+    assert_eq!(mesh.cell_arrays(), [array("id", 1, Values::I32(vec![7, 8]))]);
+    assert_eq!(mesh.point_arrays()[0].name, "v x");
+    assert_eq!(mesh.point_arrays()[1], array("T", 1, Values::F32(vec![1.0, 2.0, 3.0, 4.0, 5.0])));
+    assert_eq!(read(LEGACY.as_bytes()).unwrap(), mesh, "the content decides, not the extension");
+    let modern = "CELLS 3 8\nOFFSETS vtktypeint64\n0 4 8\nCONNECTIVITY vtktypeint64\n0 1 2 3 1 2 3 4\n";
+    let modern = LEGACY.replace("CELLS 2 10\n4 0 1 2 3\n4 1 2 3 4\n", modern).replace("3.0", "5.1");
+    assert_eq!(read_as("mesh.vtk", modern.as_bytes()).unwrap(), mesh);
+}
+
+#[test]
+fn damaged_legacy_files() {
+    let told = |from: &str, to: &str, expected: &str| {
+        let error = read_as("mesh.vtk", LEGACY.replacen(from, to, 1).as_bytes()).unwrap_err().to_string();
+        assert!(error.contains("mesh.vtk") && error.contains(expected), "{error}");
+    };
+    told("4 1 2 3 4\n", "4 1 2 3 5\n", "cell 1 names point 5");
+    told("4 1 2 3 4\n", "5 1 2 3 4\n", "cell 1 has more points");
+    told("SCALARS id int 1\nLOOKUP_TABLE default\n7 8\n", "SCALARS id int 2\n7 8\n", "vtkio cannot parse");
+    told("FIELD FieldData", "GLOBAL_IDS FieldData", "vtkio stops at byte");
+    told("POINTS 5", "POINTS 4000000000", "vtkio cannot parse");
+    told("1 2 3 4 5\n", "1 2 nan 4 5\n", "vtkio");
+}
+
+/// A generator of pseudo-random numbers (xorshift64*).
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, limit: usize) -> usize {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        ((self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 32) % limit.max(1) as u64) as usize
+    }
+}
+
+/// Damages a file in one to four places.
+fn mutated(bytes: &[u8], random: &mut Random) -> Vec<u8> {
+    let mut bytes = bytes.to_vec();
+    for _ in 0..=random.below(4) {
+        let at = random.below(bytes.len());
+        match random.below(8) {
+            0 => bytes.truncate(at),
+            1 => drop(bytes.drain(at..(at + random.below(20)).min(bytes.len()))),
+            2 => drop(bytes.splice(at..at, b"<&>\"'_-9"[random.below(8)..].to_vec())),
+            3 | 4 => bytes.iter_mut().skip(at).take(1 + random.below(8)).for_each(|b| *b = 0xff),
+            _ => bytes.iter_mut().skip(at).take(1).for_each(|b| *b = random.below(256) as u8),
+        }
+    }
+    bytes
+}
+
+#[test]
+fn damage_never_panics() {
+    let mut random = Random(20_240_607);
+    let rounds = std::env::var("HALITE_MUTATIONS").ok().and_then(|n| n.parse().ok()).unwrap_or(900);
+    let seeds: Vec<Vec<u8>> = [Mode::Ascii, Mode::Inline, Mode::AppendedBase64, Mode::AppendedRaw]
+        .iter()
+        .flat_map(|mode| {
+            [PLAIN, Style { block: Some(64), wide: true, ..PLAIN }].map(|style| Style { mode: *mode, ..style })
+        })
+        .map(|style| write(style, &[piece(), piece()]))
+        .chain([LEGACY.as_bytes().to_vec()])
+        .collect();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("mesh.vtu");
+    for round in 0..rounds {
+        let bytes = mutated(&seeds[round % seeds.len()], &mut random);
+        std::fs::write(&path, &bytes).unwrap();
+        if std::panic::catch_unwind(|| halite::io::open(&path, &|_| ())).is_err() {
+            let kept = std::env::temp_dir().join("halite-io-panic.vtu");
+            std::fs::write(&kept, bytes).unwrap();
+            panic!("round {round} panicked; the file is {}", kept.display());
+        }
+    }
+}
+
+/// Files of other programs, where they are at hand.
+fn shared(folder: &str) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    let mut folders = vec![Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared").join(folder)];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+            let path = entry.path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == "vtu") {
+                files.push(path);
+            }
+        }
+    }
+    files
+}
+
+#[test]
+fn files_of_other_programs() {
+    let folders =
+        ["data/corner/gen", "data/corner/real", "data/corner/writers", "data/tools", "data/papers", "reference/meshes"];
+    for path in folders.iter().flat_map(|folder| shared(folder)) {
+        match halite::io::open(&path, &|_| ()) {
+            Ok(_) => {}
+            Err(Error::Unsupported { what, .. }) => {
+                assert!(what.contains("LZ4DataCompressor") || what.contains("LZMADataCompressor"), "{what}");
+            }
+            // A file of PyLith's tests that was cut short.
+            Err(error) => assert!(path.ends_with("petsc_tet4_mat_vertex_t10.vtu"), "{error}"),
+        }
+    }
+}
+
+#[test]
+fn damaged_files_of_other_programs() {
+    // Damage in field data, which is not read, an unknown type of cell, and a name that is not well-formed XML do no harm.
+    let harmless = [
+        "bad_base64.vtu",
+        "huge_block_length.vtu",
+        "offset_past_end.vtu",
+        "unknown_array_type.vtu",
+        "zlib_block_count_huge.vtu",
+        "types_unknown.vtu",
+        "xml_unescaped_name.vtu",
+    ];
+    for path in shared("data/corner/bad") {
+        let name = path.file_name().unwrap().to_str().unwrap();
+        let mesh = halite::io::open(&path, &|_| ());
+        assert_eq!(mesh.is_ok(), harmless.contains(&name), "{name}: {:?}", mesh.err());
+    }
+}
