@@ -1,6 +1,9 @@
 //! The transfer function: colour and opacity as piecewise linear functions of the scalar, and the optical model that
 //! turns opacity into extinction.
 
+pub mod colormap;
+mod space;
+
 use crate::error::{Error, Result};
 
 /// How an opacity a and the unit distance d give the extinction τ per unit length.

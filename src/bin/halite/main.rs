@@ -1,3 +1,63 @@
 //! The standalone program.
 
-fn main() {}
+mod camera;
+mod choose;
+mod demo;
+mod info;
+mod output;
+mod parse;
+mod progress;
+mod render;
+
+use anyhow::{Context, Result};
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Draws unstructured grids as volumes: every pixel is the integral of the field that the mesh defines.
+#[derive(Parser)]
+#[command(version, arg_required_else_help = true, max_term_width = 110)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+    /// Threads to work with; 0 is one for each core
+    #[arg(long, global = true, value_name = "N", default_value_t = 0)]
+    threads: usize,
+    /// Say on stderr what is chosen and left out
+    #[arg(short, long, global = true)]
+    verbose: bool,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Render(Box<render::Options>),
+    Info(info::Options),
+    Demo(demo::Options),
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let level = if cli.verbose { tracing::Level::INFO } else { tracing::Level::WARN };
+    tracing_subscriber::fmt()
+        .with_max_level(level)
+        .with_writer(std::io::stderr)
+        .with_ansi(false)
+        .with_target(false)
+        .without_time()
+        .init();
+    match run(cli) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            output::error(&error);
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(cli: Cli) -> Result<()> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(cli.threads).thread_name(|i| format!("halite-{i}")).build();
+    pool.context("the threads cannot be started")?.install(|| match cli.command {
+        Command::Render(options) => render::run(&options, cli.threads),
+        Command::Info(options) => info::run(&options),
+        Command::Demo(options) => demo::run(&options, cli.threads),
+    })
+}

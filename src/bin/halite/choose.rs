@@ -1,0 +1,270 @@
+//! What is drawn when nobody says: an array, a range, colours, opacities and a view that show something of any mesh.
+
+use crate::parse::Opacity;
+use anyhow::{Result, bail};
+use glam::DVec3;
+use halite::field::{Association, Component, Field};
+use halite::mesh::{Array, Mesh, Values, cells::Tetrahedra};
+use halite::scene::{Scalars, Scene};
+use halite::transfer::TransferFunction;
+use halite::transfer::colormap::ColorMap;
+use halite::view::{Blend, Camera, Projection};
+use std::path::PathBuf;
+
+/// Behind the volume: dark, but not so that black parts of it vanish.
+const BACKGROUND: [f64; 3] = [0.11, 0.12, 0.14];
+
+const SIZE: [u32; 2] = [1024, 768];
+
+/// At most so many tetrahedra are looked at.
+const SAMPLES: usize = 1 << 20;
+
+/// Opacity bands over the range.
+const BANDS: usize = 7;
+
+/// Optical depth of the mean ray through the whole mesh, and that of the mesh's depth at opacity 1.
+const DEPTH: f64 = 1.6;
+const DEPTH_SOLID: f64 = 10.0;
+
+/// Arrays that hold names of things, not values (lower case).
+const NOT_VALUES: [&str; 13] = [
+    "vtkoriginalpointids",
+    "vtkoriginalcellids",
+    "globalnodeid",
+    "globalelementid",
+    "globalids",
+    "pedigreenodeid",
+    "pedigreeelementid",
+    "objectid",
+    "vtkghosttype",
+    "vtkghostlevels",
+    "vtkvalidpointmask",
+    "processid",
+    "partitionid",
+];
+
+/// What of the look somebody did say.
+#[derive(Default)]
+pub(crate) struct Wishes {
+    pub(crate) range: Option<[f64; 2]>,
+    pub(crate) map: Option<ColorMap>,
+    pub(crate) opacity: Option<Opacity>,
+    pub(crate) unit_distance: Option<f64>,
+    pub(crate) blend: Blend,
+}
+
+/// Whether an array, by its name, counts or marks things.
+fn is_id(name: &str) -> bool {
+    let name = name.to_lowercase();
+    NOT_VALUES.contains(&name.as_str()) || ["_id", "_ids", " id", " ids"].iter().any(|end| name.ends_with(end))
+}
+
+fn varies(array: &Array) -> bool {
+    let mut finite = (0..array.values.len()).map(|i| array.values.get(i)).filter(|v| v.is_finite());
+    let first = finite.next();
+    finite.any(|v| Some(v) != first)
+}
+
+/// The array that says most: real numbers before integers, points before cells, scalars before vectors.
+pub(crate) fn scalars(mesh: &Mesh, of: Option<Association>) -> Result<Scalars> {
+    let points = mesh.point_arrays().iter().map(|a| (Association::Point, a));
+    let cells = mesh.cell_arrays().iter().map(|a| (Association::Cell, a));
+    let all = points.chain(cells).filter(|(a, _)| of.is_none_or(|of| of == *a));
+    let best = all.min_by_key(|(association, a)| {
+        let integer = !matches!(a.values, Values::F32(_) | Values::F64(_));
+        (is_id(&a.name), !varies(a), integer, *association == Association::Cell, a.components > 1)
+    });
+    let Some((association, array)) = best else {
+        bail!("the mesh has no array of values to draw");
+    };
+    let component = if array.components > 1 { Component::Magnitude } else { Component::Index(0) };
+    Ok(Scalars { name: array.name.clone(), association: Some(association), component: Some(component) })
+}
+
+/// A view of the whole mesh: perspective, from the front right and above, z up.
+pub(crate) fn camera(mesh: &Mesh, tetrahedra: &Tetrahedra) -> Camera {
+    let (lo, hi) = bounds(mesh, tetrahedra);
+    let center = lo.midpoint(hi);
+    let far = |r: f64, p: u32| r.max(mesh.points()[p as usize].distance(center));
+    let radius = tetrahedra.corners.as_flattened().iter().fold(0.0, |r, &p| far(r, p));
+    let view_angle = 30.0_f64;
+    // A mesh may be one point, and still needs a camera.
+    let radius = if radius > 0.0 { radius } else { 1.0 };
+    Camera {
+        position: center + direction() * (radius / (view_angle.to_radians() / 2.0).sin()),
+        focal_point: center,
+        view_up: DVec3::Z,
+        projection: Projection::Perspective { view_angle },
+    }
+}
+
+/// From the mesh to the camera.
+fn direction() -> DVec3 {
+    let (azimuth, elevation) = (30.0_f64.to_radians(), 25.0_f64.to_radians());
+    DVec3::new(azimuth.sin() * elevation.cos(), -azimuth.cos() * elevation.cos(), elevation.sin())
+}
+
+/// The box around all tetrahedra.
+pub(crate) fn bounds(mesh: &Mesh, tetrahedra: &Tetrahedra) -> (DVec3, DVec3) {
+    let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    tetrahedra.corners.as_flattened().iter().fold(empty, |(lo, hi), &p| {
+        let p = mesh.points()[p as usize];
+        (lo.min(p), hi.max(p))
+    })
+}
+
+/// A scene that shows `field`, which `scalars` are in `mesh`.
+pub(crate) fn scene(
+    mesh: &Mesh,
+    tetrahedra: &Tetrahedra,
+    scalars: Scalars,
+    field: &Field,
+    wishes: Wishes,
+) -> Result<Scene> {
+    Ok(Scene {
+        mesh: PathBuf::new(),
+        transfer: transfer(mesh, tetrahedra, &scalars.name, field, &wishes)?,
+        scalars,
+        camera: camera(mesh, tetrahedra),
+        size: SIZE,
+        pixel_offset: Default::default(),
+        clipping_range: None,
+        clipping_planes: Vec::new(),
+        opaque: Vec::new(),
+        depth: None,
+        blend: wishes.blend,
+        background: Some(BACKGROUND),
+        engine: None,
+        device: None,
+        integral: None,
+        projection: None,
+    })
+}
+
+/// What the mesh and the field are like, from a sample of the tetrahedra.
+struct Sample {
+    /// Scalar somewhere in a tetrahedron, and its volume; ascending.
+    values: Vec<(f64, f64)>,
+    /// Volume of the mesh over the area that its box shows to the camera: the length of a mean ray in it.
+    depth: f64,
+}
+
+impl Sample {
+    fn new(mesh: &Mesh, tetrahedra: &Tetrahedra, field: &Field) -> Self {
+        let step = tetrahedra.corners.len().div_ceil(SAMPLES).max(1);
+        let (mut values, mut volume) = (Vec::new(), 0.0);
+        for t in (0..tetrahedra.corners.len()).step_by(step) {
+            let corners = tetrahedra.corners[t];
+            let [a, b, c, d] = corners.map(|p| mesh.points()[p as usize]);
+            let v = (b - a).cross(c - a).dot(d - a).abs() / 6.0 * step as f64;
+            volume += v;
+            let at = match field.association() {
+                Association::Cell => tetrahedra.cell.as_ref().map_or(t, |cell| cell[t] as usize),
+                // One corner, not their mean: that would lose the extremes.
+                Association::Point => corners[t / step % 4] as usize,
+            };
+            let normal = field.normal(0);
+            let s = f64::from(field.values()[at]) * normal.half + normal.mid;
+            if s.is_finite() {
+                values.push((s, v));
+            }
+        }
+        values.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (lo, hi) = bounds(mesh, tetrahedra);
+        let (e, d) = (hi - lo, direction().abs());
+        let depth = volume / (d.x * e.y * e.z + d.y * e.z * e.x + d.z * e.x * e.y);
+        Sample { values, depth: if depth > 0.0 && depth.is_finite() { depth } else { 1.0 } }
+    }
+
+    fn quantile(&self, q: f64) -> Option<f64> {
+        self.values.get(((self.values.len().max(1) - 1) as f64 * q) as usize).map(|v| v.0)
+    }
+
+    /// The range to show: that of the field, unless a few outliers stretch it.
+    fn range(&self, [lo, hi]: [f64; 2]) -> [f64; 2] {
+        if let (Some(a), Some(b)) = (self.quantile(0.01), self.quantile(0.99))
+            && b > a
+            && (hi - lo) > 4.0 * (b - a)
+        {
+            let margin = (b - a) / 10.0;
+            return [lo.max(a - margin), hi.min(b + margin)];
+        }
+        if hi > lo { [lo, hi] } else { [lo - 0.5 * lo.abs().max(1.0), hi + 0.5 * hi.abs().max(1.0)] }
+    }
+
+    /// Soft bands of opacity. What fills the mesh is clearer than what is rare, so that no value hides the others; scaled
+    /// so that the mean ray has the optical depth [`DEPTH`] at a unit distance of a [`DEPTH_SOLID`]th of the mesh.
+    fn bands(&self, [lo, hi]: [f64; 2]) -> Vec<(f64, f64)> {
+        let width = (hi - lo) / BANDS as f64;
+        let mut share = [0.0; BANDS];
+        for &(s, v) in &self.values {
+            share[(((s - lo) / width).max(0.0) as usize).min(BANDS - 1)] += v;
+        }
+        let total = share.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        let peak = share.map(|v| 1.0 / (v / total * BANDS as f64 + 0.1));
+        let mut knots = Vec::new();
+        for (i, p) in peak.into_iter().enumerate() {
+            let (from, next) = (lo + width * i as f64, peak[(i + 1).min(BANDS - 1)]);
+            if i == 0 {
+                knots.push((lo, p));
+            }
+            knots.push((from + width * 0.5, p));
+            knots.push((if i + 1 < BANDS { from + width } else { hi }, 0.1 * p.min(next)));
+        }
+        if let Some(last) = knots.last_mut() {
+            last.1 = peak[BANDS - 1];
+        }
+        knots
+    }
+
+    /// Optical depth of the mean ray, with a unit distance of a [`DEPTH_SOLID`]th of the mesh.
+    fn optical_depth(&self, transfer: &TransferFunction) -> f64 {
+        let (sum, volume) = self
+            .values
+            .iter()
+            .fold((0.0, 0.0), |(sum, volume), &(s, v)| (sum + v * transfer.opacity_at(s), volume + v));
+        if volume > 0.0 { DEPTH_SOLID * sum / volume } else { 0.0 }
+    }
+}
+
+fn transfer(
+    mesh: &Mesh,
+    tetrahedra: &Tetrahedra,
+    name: &str,
+    field: &Field,
+    wishes: &Wishes,
+) -> Result<TransferFunction> {
+    let sample = Sample::new(mesh, tetrahedra, field);
+    let mut range = wishes.range.unwrap_or_else(|| sample.range(field.range(0)));
+    let [lo, hi] = range;
+    // Values on both sides of zero are told apart by colour.
+    let signed = lo < 0.0 && hi > 0.0 && lo.abs().min(hi.abs()) > 0.25 * lo.abs().max(hi.abs());
+    if signed && wishes.range.is_none() && wishes.map.is_none() {
+        let most = hi.max(-lo);
+        range = [-most, most];
+    }
+    let map = match &wishes.map {
+        Some(map) => map.clone(),
+        None => ColorMap::named(if signed { "cool to warm" } else { "viridis" })?,
+    };
+    let unit = wishes.unit_distance.unwrap_or_else(|| rounded(sample.depth / DEPTH_SOLID));
+    let said = wishes.opacity.as_ref().map(|o| o.over(range)).or_else(|| map.opacity_over(range));
+    let mut opacity = match (&said, wishes.blend) {
+        (Some(knots), _) => knots.clone(),
+        (None, Blend::Maximum) => vec![(range[0], 0.0), (range[1], 1.0)],
+        (None, Blend::Composite) => sample.bands(range),
+    };
+    if said.is_none() && wishes.blend == Blend::Composite {
+        let depth = sample.optical_depth(&TransferFunction::new(map.over(range), opacity.clone(), unit)?);
+        let scale = if depth > 0.0 { DEPTH / depth } else { 1.0 };
+        let unit_scale = unit / (sample.depth / DEPTH_SOLID);
+        opacity.iter_mut().for_each(|k| k.1 = rounded(k.1 * scale * unit_scale));
+    }
+    tracing::info!("drawing \"{name}\" from {} to {}, unit distance {unit}", range[0], range[1]);
+    Ok(TransferFunction::new(map.over(range), opacity, unit)?)
+}
+
+/// To three digits.
+fn rounded(x: f64) -> f64 {
+    format!("{x:.2e}").parse().unwrap_or(x)
+}

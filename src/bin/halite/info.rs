@@ -1,0 +1,164 @@
+use crate::{choose, output, progress};
+use anyhow::Result;
+use clap::Args;
+use halite::mesh::cells::{self, Tetrahedra};
+use halite::mesh::faces::Faces;
+use halite::mesh::{Array, Mesh, Values};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::PathBuf;
+
+/// Tell what a mesh holds, and what of it would be drawn
+#[derive(Args)]
+pub(crate) struct Options {
+    /// The mesh
+    #[arg(value_name = "MESH.vtu")]
+    mesh: PathBuf,
+}
+
+pub(crate) fn run(options: &Options) -> Result<()> {
+    let mesh = progress::during("reading", |p| halite::io::open(&options.mesh, p))?;
+    let mut text = String::new();
+    describe(&mut text, &options.mesh.display().to_string(), &mesh)?;
+    output::print(&text)
+}
+
+fn describe(out: &mut String, name: &str, mesh: &Mesh) -> Result<()> {
+    writeln!(out, "{name}: {} cells, {} points", mesh.cells().len(), mesh.points().len())?;
+    let finite = mesh.points().iter().filter(|p| p.is_finite());
+    let (lo, hi) =
+        finite.clone().fold((glam::DVec3::INFINITY, glam::DVec3::NEG_INFINITY), |(lo, hi), &p| (lo.min(p), hi.max(p)));
+    let broken = mesh.points().len() - finite.count();
+    if lo.x <= hi.x {
+        for (axis, lo, hi) in [("x", lo.x, hi.x), ("y", lo.y, hi.y), ("z", lo.z, hi.z)] {
+            writeln!(out, "  {axis}  {} to {}", short(lo), short(hi))?;
+        }
+    }
+    if broken > 0 {
+        writeln!(out, "  {broken} points are not finite")?;
+    }
+
+    writeln!(out, "\ncells")?;
+    let mut types = BTreeMap::new();
+    for &t in &mesh.cells().types {
+        *types.entry(t).or_insert(0_usize) += 1;
+    }
+    let split = Tetrahedra::new(mesh);
+    let unsupported = split.as_ref().map(|t| t.skipped.unsupported.clone()).unwrap_or_default();
+    for (&t, count) in &types {
+        let note = match cells::dimension(t) {
+            Some(0..3) => "  not drawn: no volume",
+            _ if unsupported.contains_key(&t) => "  not drawn yet",
+            _ => "",
+        };
+        writeln!(out, "  {count:>12}  {}{note}", cells::name(t))?;
+    }
+
+    for (what, arrays) in [("point arrays", mesh.point_arrays()), ("cell arrays", mesh.cell_arrays())] {
+        if arrays.is_empty() {
+            continue;
+        }
+        writeln!(out, "\n{what}")?;
+        let wide = arrays.iter().map(|a| a.name.chars().count()).max().unwrap_or(0).min(40);
+        for a in arrays {
+            let kind = if a.components > 1 {
+                format!("{} x {}", a.components, type_name(&a.values))
+            } else {
+                type_name(&a.values).into()
+            };
+            writeln!(out, "  {:wide$}  {kind:8}  {}", a.name, ranges(a).join("   "))?;
+        }
+    }
+
+    writeln!(out, "\ndrawn")?;
+    let tetrahedra = match split {
+        Ok(t) => t,
+        Err(e) => return Ok(writeln!(out, "  nothing: {e}")?),
+    };
+    let mut row = |count: usize, what: &str| if count > 0 { writeln!(out, "  {count:>12}  {what}") } else { Ok(()) };
+    let faces = Faces::new(mesh.points(), &tetrahedra.corners);
+    let skipped = &tetrahedra.skipped;
+    row(tetrahedra.cells, "cells")?;
+    row(tetrahedra.corners.len(), "tetrahedra")?;
+    row(faces.components(), "components")?;
+    row(faces.boundary.len(), "boundary faces")?;
+    row(skipped.lower_dimensional, "cells left out: no volume")?;
+    row(skipped.unsupported.values().sum(), "cells left out: of a type that is not drawn yet")?;
+    row(skipped.ghost, "cells left out: ghosts")?;
+    row(skipped.invisible, "cells left out: a point is not finite")?;
+    row(faces.degenerate, "tetrahedra with two corners at one place, left out")?;
+    row(faces.flat, "tetrahedra of no volume")?;
+    row(faces.non_manifold, "faces of more than two tetrahedra")?;
+    row(faces.folded, "faces with both tetrahedra on one side")?;
+    // Points, scalars, corners and neighbours, as the engine holds them.
+    let bytes = mesh.points().len() * 16 + tetrahedra.corners.len() * 32 + faces.boundary.len() * 40;
+    writeln!(out, "  about {} of memory", size(bytes as f64))?;
+    if let Ok(scalars) = choose::scalars(mesh, None) {
+        writeln!(out, "  \"{}\" if no other array is asked for", scalars.name)?;
+    }
+    Ok(())
+}
+
+/// The range of each component, and of the magnitude if there are several.
+fn ranges(array: &Array) -> Vec<String> {
+    let n = array.components;
+    let component = |k: usize| move |t: usize| array.values.get(t * n + k);
+    let magnitude = |t: usize| (0..n).fold(0.0_f64, |m, k| m.hypot(array.values.get(t * n + k)));
+    match n {
+        1 => vec![range(array.tuples(), component(0))],
+        2..=9 => (0..n)
+            .map(|k| format!("{k}: {}", range(array.tuples(), component(k))))
+            .chain([format!("magnitude: {}", range(array.tuples(), magnitude))])
+            .collect(),
+        _ => vec![format!("magnitude: {}", range(array.tuples(), magnitude))],
+    }
+}
+
+fn range(tuples: usize, value: impl Fn(usize) -> f64 + Sync) -> String {
+    let empty = || (f64::INFINITY, f64::NEG_INFINITY, 0_usize, 0_usize);
+    let (lo, hi, nan, infinite) = (0..tuples)
+        .into_par_iter()
+        .fold(empty, |(lo, hi, nan, infinite), t| match value(t) {
+            v if v.is_nan() => (lo, hi, nan + 1, infinite),
+            v if v.is_infinite() => (lo, hi, nan, infinite + 1),
+            v => (lo.min(v), hi.max(v), nan, infinite),
+        })
+        .reduce(empty, |a, b| (a.0.min(b.0), a.1.max(b.1), a.2 + b.2, a.3 + b.3));
+    let mut text = if lo <= hi { format!("{} to {}", short(lo), short(hi)) } else { "no value".into() };
+    for (count, what) in [(nan, "NaN"), (infinite, "infinite")] {
+        if count > 0 {
+            text += &format!(" ({count} {what})");
+        }
+    }
+    text
+}
+
+/// Six digits, as short as they get.
+fn short(x: f64) -> String {
+    let rounded: f64 = format!("{x:.5e}").parse().unwrap_or(x);
+    if rounded == 0.0 || (1e-4..1e7).contains(&rounded.abs()) { format!("{rounded}") } else { format!("{rounded:e}") }
+}
+
+fn size(bytes: f64) -> String {
+    match bytes {
+        b if b >= 1e9 => format!("{:.1} GB", b / 1e9),
+        b if b >= 1e6 => format!("{:.0} MB", b / 1e6),
+        b => format!("{:.0} kB", (b / 1e3).ceil()),
+    }
+}
+
+fn type_name(values: &Values) -> &'static str {
+    match values {
+        Values::I8(_) => "i8",
+        Values::U8(_) => "u8",
+        Values::I16(_) => "i16",
+        Values::U16(_) => "u16",
+        Values::I32(_) => "i32",
+        Values::U32(_) => "u32",
+        Values::I64(_) => "i64",
+        Values::U64(_) => "u64",
+        Values::F32(_) => "f32",
+        Values::F64(_) => "f64",
+    }
+}

@@ -1,0 +1,124 @@
+//! The values of options. Each returns what clap shows after the option's name.
+
+use glam::DVec3;
+use halite::field::Component;
+use halite::view::ClippingPlane;
+
+fn number(text: &str) -> Result<f64, String> {
+    let n: f64 = text.trim().parse().map_err(|_| format!("\"{text}\" is not a number"))?;
+    if n.is_finite() { Ok(n) } else { Err(format!("{text} is not finite")) }
+}
+
+fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    let list = text.split(',').map(number).collect::<Result<Vec<_>, _>>()?;
+    list.try_into().map_err(|l: Vec<_>| format!("{} numbers, not {N} with commas between", l.len()))
+}
+
+/// `X,Y,Z`
+pub(crate) fn vector(text: &str) -> Result<DVec3, String> {
+    numbers(text).map(DVec3::from)
+}
+
+/// A number above 0.
+pub(crate) fn positive(text: &str) -> Result<f64, String> {
+    number(text).and_then(|n| if n > 0.0 { Ok(n) } else { Err("it is above 0".into()) })
+}
+
+/// Any finite number.
+pub(crate) fn finite(text: &str) -> Result<f64, String> {
+    number(text)
+}
+
+/// `WxH`
+pub(crate) fn size(text: &str) -> Result<[u32; 2], String> {
+    let parts = text.split_once(['x', 'X']).and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
+    let size = parts.ok_or("the size is width x height in pixels, such as 1024x768")?;
+    if size.contains(&0) { Err("it has no pixels".into()) } else { Ok(size) }
+}
+
+/// `LO:HI`
+pub(crate) fn range(text: &str) -> Result<[f64; 2], String> {
+    let (lo, hi) = text.split_once(':').ok_or("a range is two numbers, such as 0:1")?;
+    let range = [number(lo)?, number(hi)?];
+    if range[0] < range[1] { Ok(range) } else { Err("the first number is below the second".into()) }
+}
+
+/// `0`, `1`, … or `magnitude`
+pub(crate) fn component(text: &str) -> Result<Component, String> {
+    match text {
+        "magnitude" => Ok(Component::Magnitude),
+        _ => text.parse().map(Component::Index).map_err(|_| "it is an index from 0, or \"magnitude\"".into()),
+    }
+}
+
+/// What an 8-bit picture shows behind the volume: a colour, or nothing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Background {
+    None,
+    Color([f64; 3]),
+}
+
+/// `R,G,B`, `black`, `white` or `none`
+pub(crate) fn background(text: &str) -> Result<Background, String> {
+    Ok(match text {
+        "none" => Background::None,
+        "black" => Background::Color([0.0; 3]),
+        "white" => Background::Color([1.0; 3]),
+        _ => {
+            let color = numbers(text)?;
+            if !color.iter().all(|c| (0.0..=1.0).contains(c)) {
+                return Err("red, green and blue are 0 to 1".into());
+            }
+            Background::Color(color)
+        }
+    })
+}
+
+/// `X,Y,Z,NX,NY,NZ`
+pub(crate) fn plane(text: &str) -> Result<ClippingPlane, String> {
+    let [x, y, z, a, b, c] = numbers(text)?;
+    let (origin, normal) = (DVec3::new(x, y, z), DVec3::new(a, b, c));
+    if normal == DVec3::ZERO { Err("the normal is zero".into()) } else { Ok(ClippingPlane { origin, normal }) }
+}
+
+/// An opacity function; places marked so are percent of the range.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Opacity(Vec<(f64, bool, f64)>);
+
+impl Opacity {
+    /// Its knots, for a range of scalars.
+    pub(crate) fn over(&self, [lo, hi]: [f64; 2]) -> Vec<(f64, f64)> {
+        let at = |s: f64, percent: bool| if percent { lo + (hi - lo) * (s / 100.0) } else { s };
+        self.0.iter().map(|&(s, percent, a)| (at(s, percent), a)).collect()
+    }
+}
+
+/// `S:A,S:A,…`
+pub(crate) fn opacity(text: &str) -> Result<Opacity, String> {
+    let knot = |k: &str| {
+        let (s, a) = k.split_once(':').ok_or("knots are scalar:opacity, such as 0:0,50%:0.2,1:1")?;
+        let (percent, s) = s.strip_suffix('%').map_or((false, s), |s| (true, s));
+        Ok((number(s)?, percent, number(a)?))
+    };
+    text.split(',').map(knot).collect::<Result<_, String>>().map(Opacity)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values() {
+        assert_eq!(size("640x480"), Ok([640, 480]));
+        assert_eq!(range("-1:2.5"), Ok([-1.0, 2.5]));
+        assert_eq!(component("2"), Ok(Component::Index(2)));
+        assert_eq!(vector("1,-2, 3"), Ok(DVec3::new(1.0, -2.0, 3.0)));
+        assert_eq!(background("0,0.5,1"), Ok(Background::Color([0.0, 0.5, 1.0])));
+        assert_eq!(opacity("1:0,50%:0.25").unwrap().over([2.0, 4.0]), [(1.0, 0.0), (3.0, 0.25)]);
+        for wrong in ["640", "x", "0x4", "-1x4", "640x480x3"] {
+            assert!(size(wrong).is_err(), "{wrong}");
+        }
+        assert!(range("2:1").is_err() && range("nan:1").is_err() && vector("1,2").is_err());
+        assert!(background("0,0,255").is_err() && plane("0,0,0,0,0,0").is_err() && positive("0").is_err());
+    }
+}

@@ -1,0 +1,322 @@
+use crate::{camera, choose, output, parse, progress};
+use anyhow::{Context, Result, bail};
+use clap::{Args, ValueEnum};
+use halite::field::{Association, Component, Field};
+use halite::image::{Backdrop, Image};
+use halite::mesh::{Mesh, cells, cells::Tetrahedra};
+use halite::render::{Renderer, Stats};
+use halite::scene::{Scalars, Scene};
+use halite::transfer::TransferFunction;
+use halite::transfer::colormap::ColorMap;
+use halite::view::{Blend, ClippingPlane, View};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Draw a mesh, or what a scene file describes, into a picture
+///
+/// With a mesh alone, scalars, colours, opacities and view are chosen so that something is seen. With a scene file, its
+/// values hold unless an option says otherwise.
+#[derive(Args)]
+pub(crate) struct Options {
+    /// The mesh, or the scene that describes it (.json)
+    #[arg(value_name = "MESH.vtu|SCENE.json")]
+    input: PathBuf,
+    /// The picture: .png (8-bit), .exr or .npy (linear premultiplied RGBA, 32-bit float)
+    #[arg(short, long, value_name = "FILE")]
+    out: PathBuf,
+    /// Width and height in pixels [default: the scene's, or 1024x768]
+    #[arg(long, value_name = "WxH", value_parser = parse::size)]
+    size: Option<[u32; 2]>,
+    /// What a .png shows behind the volume: R,G,B in 0 to 1, "black", "white", or "none" for transparency
+    #[arg(long, value_name = "COLOR", value_parser = parse::background)]
+    background: Option<parse::Background>,
+    /// Write what was done, and the time and memory it took, as JSON
+    #[arg(long, value_name = "FILE")]
+    stats: Option<PathBuf>,
+
+    /// The array to draw [default: the first useful one]
+    #[arg(long, value_name = "NAME", help_heading = "Field")]
+    scalars: Option<String>,
+    /// Whether it belongs to points or cells [default: points first]
+    #[arg(long, help_heading = "Field")]
+    association: Option<Of>,
+    /// What of a vector: an index from 0, or "magnitude" [default: magnitude]
+    #[arg(long, value_name = "N", value_parser = parse::component, help_heading = "Field")]
+    component: Option<Component>,
+
+    /// viridis, inferno, "cool to warm", grey, or a preset of ParaView: FILE.json, or FILE.json:NAME
+    #[arg(long, value_name = "MAP", help_heading = "Look")]
+    colormap: Option<String>,
+    /// The scalars that colours and opacities range over
+    #[arg(long, value_name = "LO:HI", value_parser = parse::range, allow_hyphen_values = true, help_heading = "Look")]
+    range: Option<[f64; 2]>,
+    /// Opacity at scalars, linear between them; a scalar may be a percentage of the range: 0%:0,40%:0.3,100%:1
+    #[arg(long, value_name = "S:A,...", value_parser = parse::opacity, allow_hyphen_values = true, help_heading = "Look")]
+    opacity: Option<parse::Opacity>,
+    /// The length that opacities are meant for, in world units
+    #[arg(long, value_name = "LENGTH", value_parser = parse::positive, help_heading = "Look")]
+    unit_distance: Option<f64>,
+    /// Integrate along each ray, or show its largest value
+    #[arg(long, help_heading = "Look")]
+    blend: Option<Blending>,
+    /// Keep what lies on the normal's side of a plane; may be given again
+    #[arg(long, value_name = "X,Y,Z,NX,NY,NZ", value_parser = parse::plane, allow_hyphen_values = true, help_heading = "Look")]
+    clip: Vec<ClippingPlane>,
+
+    #[command(flatten)]
+    camera: camera::Options,
+
+    /// How rays find their cells
+    #[arg(long, help_heading = "Engine")]
+    engine: Option<Engine>,
+    /// Where the work is done; HALITE_DEVICE overrides it
+    #[arg(long, help_heading = "Engine")]
+    device: Option<Device>,
+    /// How a ray is integrated in a cell
+    #[arg(long, help_heading = "Engine")]
+    integral: Option<Integral>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Of {
+    Point,
+    Cell,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Blending {
+    Composite,
+    Maximum,
+}
+
+/// One engine so far, so there is nothing to hand on.
+#[derive(Clone, Copy, ValueEnum)]
+enum Engine {
+    Auto,
+    Traverse,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Device {
+    Auto,
+    Cpu,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Integral {
+    Exact,
+}
+
+pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
+    output::check_picture(&options.out)?;
+    if let Some(path) = &options.stats {
+        output::check(path)?;
+    }
+    let map = options.colormap.as_deref().map(color_map).transpose()?;
+    let from_file = options.input.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+    let given = if from_file { Some(Scene::open(&options.input)?) } else { None };
+    check_device(given.as_ref()).with_context(|| options.input.display().to_string())?;
+
+    let start = Instant::now();
+    let path = given.as_ref().map_or(&options.input, |scene| &scene.mesh);
+    let mesh = progress::during("reading", |p| halite::io::open(path, p))?;
+    let load_ms = ms(start);
+    let start = Instant::now();
+    let tetrahedra = Tetrahedra::new(&mesh).with_context(|| path.display().to_string())?;
+    let split_ms = ms(start);
+    tell_skipped(&tetrahedra.skipped);
+
+    let scalars = options.scalars(given.as_ref(), &mesh)?;
+    let field = scalars.field(&mesh).with_context(|| path.display().to_string())?;
+    let mut scene = match given {
+        Some(scene) => options.restyled(scene, map)?,
+        None => {
+            let wishes = choose::Wishes {
+                range: options.range,
+                map,
+                opacity: options.opacity.clone(),
+                unit_distance: options.unit_distance,
+                blend: options.blend().unwrap_or_default(),
+            };
+            choose::scene(&mesh, &tetrahedra, scalars, &field, wishes)?
+        }
+    };
+    scene.size = options.size.unwrap_or(scene.size);
+    scene.camera = options.camera.apply(scene.camera);
+    scene.blend = options.blend().unwrap_or(scene.blend);
+    scene.clipping_planes.extend(&options.clip);
+    scene.background = match options.background {
+        Some(parse::Background::Color(c)) => Some(c),
+        Some(parse::Background::None) => None,
+        None if from_file => Some(scene.background.unwrap_or_default()),
+        None => scene.background,
+    };
+    let (view, behind) = scene.view()?;
+
+    let drawn = draw(&mesh, tetrahedra, &field, &scene.transfer, &view, threads)?;
+    drawn.image.save(&options.out, backdrop(scene.background, behind.as_deref()))?;
+    if let Some(path) = &options.stats {
+        let json = drawn.report(view.size(), load_ms, split_ms);
+        std::fs::write(path, format!("{json:#}\n")).with_context(|| path.display().to_string())?;
+    }
+    Ok(())
+}
+
+impl Options {
+    fn scalars(&self, scene: Option<&Scene>, mesh: &Mesh) -> Result<Scalars> {
+        let association = self.association.map(|a| match a {
+            Of::Point => Association::Point,
+            Of::Cell => Association::Cell,
+        });
+        let mut scalars = match (&self.scalars, scene) {
+            (Some(name), _) => Scalars { name: name.clone(), association: None, component: None },
+            (None, Some(scene)) => scene.scalars.clone(),
+            (None, None) => choose::scalars(mesh, association)?,
+        };
+        scalars.association = association.or(scalars.association);
+        scalars.component = self.component.or(scalars.component);
+        Ok(scalars)
+    }
+
+    fn blend(&self) -> Option<Blend> {
+        self.blend.map(|b| match b {
+            Blending::Composite => Blend::Composite,
+            Blending::Maximum => Blend::Maximum,
+        })
+    }
+
+    /// `scene`, with the transfer function that the options ask for.
+    fn restyled(&self, mut scene: Scene, map: Option<ColorMap>) -> Result<Scene> {
+        let old = &scene.transfer;
+        let (first, last) = (old.color()[0].0, old.color()[old.color().len() - 1].0);
+        let range = self.range.unwrap_or([first, last]);
+        // A range moves both functions; opacity knots may lie outside that of the colours.
+        let moved = |s: f64| match self.range {
+            Some([lo, hi]) if last > first => lo + (hi - lo) * ((s - first) / (last - first)),
+            _ => s,
+        };
+        let opacity = match (&self.opacity, map.as_ref().and_then(|m| m.opacity_over(range))) {
+            (Some(o), _) => o.over(range),
+            (None, Some(o)) => o,
+            (None, None) => old.opacity().iter().map(|&(s, a)| (moved(s), a)).collect(),
+        };
+        let color = match map {
+            Some(map) => map.over(range),
+            None => old.color().iter().map(|&(s, c)| (moved(s), c)).collect(),
+        };
+        scene.transfer = TransferFunction::new(color, opacity, self.unit_distance.unwrap_or(old.unit_distance()))?
+            .with_convention(old.convention())
+            .with_clamp(old.clamp())
+            .with_emission(old.emission())?;
+        Ok(scene)
+    }
+}
+
+/// A colour map by name, or from `FILE.json` or `FILE.json:NAME`.
+fn color_map(text: &str) -> Result<ColorMap> {
+    let (file, preset) = match text.split_once(".json:") {
+        Some((stem, preset)) => (format!("{stem}.json"), Some(preset)),
+        None => (text.to_owned(), None),
+    };
+    Ok(if file.ends_with(".json") { ColorMap::open(Path::new(&file), preset)? } else { ColorMap::named(text)? })
+}
+
+/// Refuses what a scene, or the environment, asks for and Halite has not: what options ask for, clap has checked.
+fn check_device(scene: Option<&Scene>) -> Result<()> {
+    fn check<T: ValueEnum>(what: &str, name: &str) -> Result<()> {
+        if T::from_str(name, true).is_err() {
+            let known = T::value_variants().iter().filter_map(ValueEnum::to_possible_value);
+            let known = known.map(|v| v.get_name().to_owned()).collect::<Vec<_>>().join(", ");
+            bail!("{what}: \"{name}\" is not known here; there is {known}");
+        }
+        Ok(())
+    }
+    if let Ok(name) = std::env::var("HALITE_DEVICE") {
+        check::<Device>("HALITE_DEVICE", &name)?;
+    }
+    let Some(scene) = scene else { return Ok(()) };
+    if let Some(name) = &scene.engine {
+        check::<Engine>("engine", name)?;
+    }
+    let text = |v: &serde_json::Value| v.as_str().map_or_else(|| v.to_string(), str::to_owned);
+    if let Some(device) = &scene.device {
+        check::<Device>("device", &text(device))?;
+    }
+    if let Some(integral) = &scene.integral {
+        check::<Integral>("integral", &text(integral))?;
+    }
+    Ok(())
+}
+
+fn tell_skipped(skipped: &cells::Skipped) {
+    for (&kind, count) in &skipped.unsupported {
+        tracing::warn!("{count} cells are left out: {} is not drawn yet", cells::name(kind));
+    }
+    if skipped.invisible > 0 {
+        tracing::warn!("{} cells are left out: they have a point that is not finite", skipped.invisible);
+    }
+    if skipped.lower_dimensional > 0 {
+        tracing::info!("{} cells are left out: they have no volume (2D or less)", skipped.lower_dimensional);
+    }
+    if skipped.ghost > 0 {
+        tracing::info!("{} cells are left out: they are ghosts", skipped.ghost);
+    }
+}
+
+/// A picture, and what it took.
+pub(crate) struct Drawn {
+    pub(crate) image: Image,
+    stats: Stats,
+    first_frame_ms: f64,
+}
+
+pub(crate) fn draw(
+    mesh: &Mesh,
+    tetrahedra: Tetrahedra,
+    field: &Field,
+    transfer: &TransferFunction,
+    view: &View,
+    threads: usize,
+) -> Result<Drawn> {
+    let mut renderer = Renderer::new(threads)?;
+    renderer.set_mesh(mesh, tetrahedra)?;
+    renderer.set_field(field)?;
+    renderer.set_transfer(transfer)?;
+    let start = Instant::now();
+    let image = progress::during("drawing", |p| renderer.render(view, p))?;
+    Ok(Drawn { image, stats: renderer.stats().clone(), first_frame_ms: ms(start) })
+}
+
+impl Drawn {
+    fn report(&self, size: [u32; 2], load_ms: f64, split_ms: f64) -> serde_json::Value {
+        let s = &self.stats;
+        serde_json::json!({
+            "engine": s.engine, "device": s.device, "adapter": s.adapter,
+            "size": size, "cells": s.cells, "tetrahedra": s.tetrahedra,
+            "load_ms": load_ms, "faces_ms": split_ms + s.faces_ms, "upload_ms": s.upload_ms,
+            "first_frame_ms": self.first_frame_ms, "frame_ms": s.frame_ms, "transfer_edit_ms": null,
+            "steps": s.steps, "repaired_rays": s.repaired_rays,
+            "device_bytes": s.device_bytes, "peak_bytes": peak_bytes(),
+        })
+    }
+}
+
+/// The most memory that this process ever held, where the system says so.
+fn peak_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
+    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kb| kb * 1024)
+}
+
+/// What an 8-bit picture shows behind the volume: opaque objects, if there are any.
+pub(crate) fn backdrop(background: Option<[f64; 3]>, behind: Option<&[[f32; 3]]>) -> Backdrop<'_> {
+    match (behind, background) {
+        (Some(pixels), _) => Backdrop::Pixels(pixels),
+        (None, Some(c)) => Backdrop::Color(c.map(|c| c as f32)),
+        (None, None) => Backdrop::Transparent,
+    }
+}
+
+fn ms(start: Instant) -> f64 {
+    start.elapsed().as_secs_f64() * 1e3
+}
