@@ -13,7 +13,7 @@
 //! where nothing more can be seen.
 
 use crate::field::{Kind, Normal};
-use crate::real::Real;
+use crate::real::{Arithmetic, Lanes, Real};
 use crate::transfer::{Convention, Emission, OPAQUE, TransferFunction};
 
 /// Extinction that stands for "opaque", per normalised unit of length: even the thinnest slab that f32 can tell from
@@ -44,74 +44,80 @@ pub(crate) const PANEL: f64 = 4.0;
 
 /// What one piece does: its opacity and the weights of the emission at its two ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Piece<R> {
+pub struct Piece<A> {
     /// Opacity, in [0, 1].
-    pub alpha: R,
+    pub alpha: A,
     /// Weight of the front end's colour (chromatic) or of its emission times length (direct).
-    pub front: R,
+    pub front: A,
     /// The same for the back end.
-    pub back: R,
+    pub back: A,
+}
+
+impl<A: Arithmetic> Piece<A> {
+    /// A piece of optical depths `x` (τ_f l) and `y` (τ_b l), both within [0, [`PANEL`]]: no decisions, so for lanes as well.
+    #[inline(always)]
+    pub fn moderate(x: A, y: A, direct: bool) -> Self {
+        gauss(
+            &GAUSS_6,
+            x,
+            y,
+            A::of(0.0),
+            A::of(1.0),
+            direct,
+            Piece { alpha: A::of(0.0), front: A::of(0.0), back: A::of(0.0) },
+        )
+    }
+}
+
+/// Adds to `sum` what the panel of `width` at `from`, both in [0, 1], emits and absorbs.
+#[inline(always)]
+fn gauss<A: Arithmetic, const N: usize>(
+    rule: &[[f64; 2]; N],
+    x: A,
+    y: A,
+    from: A,
+    width: A,
+    direct: bool,
+    mut sum: Piece<A>,
+) -> Piece<A> {
+    let (zero, one, half) = (A::of(0.0), A::of(1.0), A::of(0.5));
+    for [node, weight] in rule {
+        let u = from + width * A::of(*node);
+        let rise = (y - x) * u;
+        let seen = (zero - (x + rise * half) * u).exp() * (width * A::of(*weight));
+        let absorbed = (x + rise) * seen;
+        let emitted = if direct { seen } else { absorbed };
+        sum.alpha = sum.alpha + absorbed;
+        sum.front = sum.front + (one - u) * emitted;
+        sum.back = sum.back + u * emitted;
+    }
+    sum
 }
 
 impl<R: Real> Piece<R> {
     /// A piece of optical depths `x` (τ_f l) and `y` (τ_b l), both finite and at least 0. Error at most 1e-6, and 1e-5 of α.
     #[inline(always)]
     pub fn new(x: R, y: R, direct: bool) -> Self {
-        let alpha = opacity((x + y) * R::of(0.5));
-        if direct {
-            let [psi, phi] = quadrature(x, y, |_, u, e| [e, u * e]);
-            Piece { alpha, front: psi - phi, back: phi }
-        } else {
-            let [beta] = quadrature(x, y, |slope, u, e| [u * slope * e]);
-            let beta = beta.min(alpha);
-            Piece { alpha, front: alpha - beta, back: beta }
+        let (zero, one) = (R::of(0.0), R::of(1.0));
+        let none = Piece { alpha: zero, front: zero, back: zero };
+        let steepest = x.max(y);
+        if steepest <= R::of(SHALLOW) {
+            return gauss(&GAUSS_3, x, y, zero, one, direct, none);
         }
-    }
-}
-
-/// 1 − e^{−depth}, accurate relative to itself.
-#[inline(always)]
-fn opacity<R: Real>(depth: R) -> R {
-    let one = R::of(1.0);
-    if depth < R::of(0.25) {
-        let [c2, c3, c4, c5, c6] = [2.0, 3.0, 4.0, 5.0, 6.0].map(|k| R::of(-1.0 / k));
-        depth * (one + depth * c2 * (one + depth * c3 * (one + depth * c4 * (one + depth * c5 * (one + depth * c6)))))
-    } else {
-        one - (-depth).exp()
-    }
-}
-
-/// ∫₀¹ f(T′(u), u, e^{−T(u)}) du for each value of f, with T(u) = x u + (y − x) u²/2.
-#[inline(always)]
-fn quadrature<R: Real, const N: usize>(x: R, y: R, f: impl Fn(R, R, R) -> [R; N]) -> [R; N] {
-    let half = R::of(0.5);
-    let node = |from: R, width: R, [node, weight]: [f64; 2], sum: &mut [R; N]| {
-        let u = from + width * R::of(node);
-        let rise = (y - x) * u;
-        let values = f(x + rise, u, (-(x + rise * half) * u).exp());
-        for k in 0..N {
-            sum[k] = sum[k] + width * R::of(weight) * values[k];
+        if steepest <= R::of(PANEL) {
+            return Piece::moderate(x, y, direct);
         }
-    };
-    let (zero, one) = (R::of(0.0), R::of(1.0));
-    let mut sum = [zero; N];
-    if x.max(y) <= R::of(SHALLOW) {
-        for g in GAUSS_3 {
-            node(zero, one, g, &mut sum);
+        // Beyond T(u) = DEEP nothing is seen: x u + (y − x) u²/2 = DEEP.
+        let deep = R::of(2.0 * DEEP);
+        let end = if x + y > deep { (deep / (x + (x * x + deep * (y - x)).max(zero).sqrt())).min(one) } else { one };
+        let panels = (x.max(x + (y - x) * end) * end / R::of(PANEL)).truncate() + 1;
+        let width = end / R::of(f64::from(panels));
+        let mut sum = none;
+        for p in 0..panels {
+            sum = gauss(&GAUSS_6, x, y, width * R::of(f64::from(p)), width, direct, sum);
         }
-        return sum;
+        Piece { alpha: one - (-((x + y) * R::of(0.5))).exp(), ..sum }
     }
-    // Beyond T(u) = DEEP nothing is seen: x u + (y − x) u²/2 = DEEP.
-    let deep = R::of(2.0 * DEEP);
-    let end = if x + y > deep { (deep / (x + (x * x + deep * (y - x)).max(zero).sqrt())).min(one) } else { one };
-    let panels = (x.max(x + (y - x) * end) * end / R::of(PANEL)).truncate() + 1;
-    let width = end / R::of(f64::from(panels));
-    for p in 0..panels {
-        for g in GAUSS_6 {
-            node(width * R::of(f64::from(p)), width, g, &mut sum);
-        }
-    }
-    sum
 }
 
 /// A piecewise linear function of the normalised scalar with four channels: extinction per normalised unit of length,
@@ -256,6 +262,15 @@ impl<R: Real> Light<R> {
     pub fn none() -> Self {
         Light { color: [R::of(0.0); 3], through: R::of(1.0) }
     }
+
+    /// Adds something behind: the light that it emits, and its opacity.
+    #[inline(always)]
+    pub fn add(&mut self, emitted: [R; 3], alpha: R) {
+        for k in 0..3 {
+            self.color[k] = self.color[k] + self.through * emitted[k];
+        }
+        self.through = self.through * (R::of(1.0) - alpha);
+    }
 }
 
 /// A transfer function made ready for the fields of one mesh: the integral of a segment in its exact form.
@@ -303,10 +318,16 @@ impl<R: Real> Exact<R> {
         Exact { kind, opacity, color, scale: R::of(emission), direct }
     }
 
-    /// Adds a segment of `length` (normalised units) whose field is `front` where the ray enters and `back` where it leaves.
-    /// Values that are not finite make it invisible. `N` is the number of the field's components.
+    /// Calls `piece` for each piece of a segment whose field is `front` where the ray enters and `back` where it leaves, in
+    /// order: with extinction and colour at its two ends, and its share of the segment's length. Values that are not finite
+    /// make the segment invisible. `N` is the number of the field's components.
     #[inline(always)]
-    pub fn add<const N: usize>(&self, front: &[R; N], back: &[R; N], length: R, light: &mut Light<R>) {
+    pub fn for_each_piece<const N: usize>(
+        &self,
+        front: &[R; N],
+        back: &[R; N],
+        mut piece: impl FnMut([R; 4], [R; 4], R),
+    ) {
         if !front.iter().chain(back).all(|v| v.is_finite()) {
             return;
         }
@@ -329,9 +350,10 @@ impl<R: Real> Exact<R> {
                     b[k + 1] = (front[k] + rise * next) * self.scale;
                 }
             }
-            let l = (next - u) * length;
-            self.add_piece(f, b, l, light);
-            if next >= one || light.through <= zero {
+            if f[0] + b[0] > zero || self.direct {
+                piece(f, b, next - u);
+            }
+            if next >= one {
                 return;
             }
             let more = (opacity_end > next || opacity.advance())
@@ -343,19 +365,101 @@ impl<R: Real> Exact<R> {
         }
     }
 
-    /// Adds one piece of length `l` with extinction and colour `f` in front and `b` behind.
+    /// Adds a segment of `length` (normalised units) to `light`; see [`Exact::for_each_piece`].
+    pub fn add<const N: usize>(&self, front: &[R; N], back: &[R; N], length: R, light: &mut Light<R>) {
+        self.for_each_piece(front, back, |f, b, share| {
+            let l = share * length;
+            let piece = Piece::new(f[0] * l, b[0] * l, self.direct);
+            let l = if self.direct { l } else { R::of(1.0) };
+            light.add([1, 2, 3].map(|k| (f[k] * piece.front + b[k] * piece.back) * l), piece.alpha);
+        });
+    }
+}
+
+/// Pieces that a [`Batch`] holds.
+const BATCH: usize = 32;
+
+/// Pieces of one ray, in order, that wait to be integrated side by side.
+#[derive(Debug, Clone)]
+pub struct Batch {
+    len: usize,
+    length: [f32; BATCH],
+    front: [[f32; BATCH]; 4],
+    back: [[f32; BATCH]; 4],
+}
+
+impl Default for Batch {
+    fn default() -> Self {
+        Batch { len: 0, length: [0.0; BATCH], front: [[0.0; BATCH]; 4], back: [[0.0; BATCH]; 4] }
+    }
+}
+
+impl Batch {
+    /// Forgets all pieces.
+    pub fn clear(&mut self) {
+        self.len = 0;
+    }
+
+    /// Takes a segment; what does not fit any more goes to `light`.
     #[inline(always)]
-    fn add_piece(&self, f: [R; 4], b: [R; 4], l: R, light: &mut Light<R>) {
-        let zero = R::of(0.0);
-        if f[0] + b[0] <= zero && !self.direct {
-            return;
+    pub fn add<const N: usize>(
+        &mut self,
+        exact: &Exact<f32>,
+        front: &[f32; N],
+        back: &[f32; N],
+        length: f32,
+        light: &mut Light<f32>,
+    ) {
+        exact.for_each_piece(front, back, |f, b, share| {
+            if self.len == BATCH {
+                self.flush(exact.direct, light);
+            }
+            self.length[self.len] = share * length;
+            for k in 0..4 {
+                self.front[k][self.len] = f[k];
+                self.back[k][self.len] = b[k];
+            }
+            self.len += 1;
+        });
+    }
+
+    /// Adds all pieces to `light` and forgets them.
+    pub fn flush(&mut self, direct: bool, light: &mut Light<f32>) {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            #[target_feature(enable = "avx2")]
+            fn wide(batch: &mut Batch, direct: bool, light: &mut Light<f32>) {
+                batch.integrate::<8>(direct, light);
+            }
+            #[allow(unsafe_code, reason = "the processor was just asked whether it has these instructions")]
+            // SAFETY: see the reason above; the function is safe otherwise.
+            return unsafe { wide(self, direct, light) };
         }
-        let piece = Piece::new(f[0] * l, b[0] * l, self.direct);
-        let emitted = if self.direct { light.through * l } else { light.through };
-        for k in 0..3 {
-            light.color[k] = light.color[k] + emitted * (f[k + 1] * piece.front + b[k + 1] * piece.back);
+        self.integrate::<4>(direct, light);
+    }
+
+    #[inline(always)]
+    fn integrate<const L: usize>(&mut self, direct: bool, light: &mut Light<f32>) {
+        for start in (0..self.len).step_by(L) {
+            let lanes = |of: &[f32; BATCH]| Lanes::<L>(std::array::from_fn(|i| of[start + i]));
+            let length = lanes(&self.length);
+            let (x, y) = (lanes(&self.front[0]) * length, lanes(&self.back[0]) * length);
+            let mut piece = Piece::moderate(x, y, direct);
+            for i in 0..L.min(self.len - start) {
+                if x.0[i].max(y.0[i]) > PANEL as f32 {
+                    let deep = Piece::new(x.0[i], y.0[i], direct);
+                    (piece.alpha.0[i], piece.front.0[i], piece.back.0[i]) = (deep.alpha, deep.front, deep.back);
+                }
+            }
+            let emitted = [1, 2, 3].map(|k| {
+                let sum = lanes(&self.front[k]) * piece.front + lanes(&self.back[k]) * piece.back;
+                if direct { sum * length } else { sum }
+            });
+            for i in 0..L.min(self.len - start) {
+                light.add([0, 1, 2].map(|k| emitted[k].0[i]), piece.alpha.0[i]);
+            }
         }
-        light.through = light.through * (R::of(1.0) - piece.alpha);
+        self.len = 0;
     }
 }
 

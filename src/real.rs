@@ -3,61 +3,58 @@
 use std::fmt::Debug;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// A floating-point number: f32, as the engines compute, or f64, as the tests judge them.
-pub trait Real:
-    Copy
-    + Debug
-    + PartialOrd
-    + Send
-    + Sync
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + Div<Output = Self>
-    + Neg<Output = Self>
-    + 'static
-{
+/// What arithmetic without decisions needs: a number, or several [`Lanes`] of them.
+pub trait Arithmetic: Copy + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
     /// The nearest number of this type; beyond its range, ±∞.
     fn of(x: f64) -> Self;
     /// eˣ for x ≤ 0.
     fn exp(self) -> Self;
+}
+
+/// A floating-point number: f32, as the engines compute, or f64, as the tests judge them.
+pub trait Real: Arithmetic + PartialOrd + Send + Sync + Div<Output = Self> + Neg<Output = Self> + 'static {
     /// √x.
     fn sqrt(self) -> Self;
     /// The integer part of x, for 0 ≤ x < 2³².
     fn truncate(self) -> u32;
-    /// The smaller of the two; the other one if either is NaN.
-    fn min(self, other: Self) -> Self;
-    /// The larger of the two; the other one if either is NaN.
-    fn max(self, other: Self) -> Self;
     /// Neither NaN nor infinite.
     fn is_finite(self) -> bool;
+
+    /// The smaller of the two; `other` if either is NaN.
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        if self < other { self } else { other }
+    }
+
+    /// The larger of the two; `other` if either is NaN.
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        if self > other { self } else { other }
+    }
 }
 
-impl Real for f64 {
+impl Arithmetic for f64 {
     fn of(x: f64) -> Self {
         x
     }
     fn exp(self) -> Self {
         f64::exp(self)
     }
+}
+
+impl Real for f64 {
     fn sqrt(self) -> Self {
         f64::sqrt(self)
     }
     fn truncate(self) -> u32 {
         self as u32
     }
-    fn min(self, other: Self) -> Self {
-        f64::min(self, other)
-    }
-    fn max(self, other: Self) -> Self {
-        f64::max(self, other)
-    }
     fn is_finite(self) -> bool {
         f64::is_finite(self)
     }
 }
 
-impl Real for f32 {
+impl Arithmetic for f32 {
     #[inline(always)]
     fn of(x: f64) -> Self {
         x as f32
@@ -66,6 +63,9 @@ impl Real for f32 {
     fn exp(self) -> Self {
         exp(self)
     }
+}
+
+impl Real for f32 {
     #[inline(always)]
     fn sqrt(self) -> Self {
         f32::sqrt(self)
@@ -75,16 +75,36 @@ impl Real for f32 {
         self as u32
     }
     #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        f32::min(self, other)
-    }
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        f32::max(self, other)
-    }
-    #[inline(always)]
     fn is_finite(self) -> bool {
         f32::is_finite(self)
+    }
+}
+
+/// `L` numbers that are computed side by side: the compiler makes vector instructions of them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lanes<const L: usize>(pub [f32; L]);
+
+macro_rules! lane_by_lane {
+    ($($operator:ident $name:ident),*) => {$(
+        impl<const L: usize> $operator for Lanes<L> {
+            type Output = Self;
+            #[inline(always)]
+            fn $name(self, other: Self) -> Self {
+                Lanes(std::array::from_fn(|i| self.0[i].$name(other.0[i])))
+            }
+        }
+    )*};
+}
+lane_by_lane!(Add add, Sub sub, Mul mul);
+
+impl<const L: usize> Arithmetic for Lanes<L> {
+    #[inline(always)]
+    fn of(x: f64) -> Self {
+        Lanes([x as f32; L])
+    }
+    #[inline(always)]
+    fn exp(self) -> Self {
+        Lanes(std::array::from_fn(|i| exp(self.0[i])))
     }
 }
 
@@ -94,7 +114,7 @@ impl Real for f32 {
 fn exp(x: f32) -> f32 {
     // x = k ln 2 + r with |r| ≤ ln 2 / 2; adding and subtracting 1.5·2²³ rounds to an integer.
     const ROUND: f32 = 12_582_912.0;
-    let clamped = x.max(-87.0);
+    let clamped = if x > -87.0 { x } else { -87.0 };
     let shifted = clamped * std::f32::consts::LOG2_E + ROUND;
     let k = shifted - ROUND;
     let r = (clamped - k * 0.693_359_375) - k * -2.121_944_4e-4;
@@ -105,17 +125,17 @@ fn exp(x: f32) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use super::Real;
+    use super::Arithmetic;
 
     #[test]
     fn exp_is_accurate_to_its_last_place() {
         for i in 0..=870_000 {
             let x = -(i as f32) * 1e-4;
-            let (got, want) = (f64::from(Real::exp(x)), f64::from(x).exp());
+            let (got, want) = (f64::from(Arithmetic::exp(x)), f64::from(x).exp());
             assert!((got - want).abs() <= 1.8e-7 * want, "exp({x}) = {got}, not {want}");
         }
-        assert_eq!(Real::exp(-1e30f32), 0.0);
-        assert_eq!(Real::exp(f32::NEG_INFINITY), 0.0);
-        assert_eq!(Real::exp(0f32), 1.0);
+        assert_eq!(Arithmetic::exp(-1e30f32), 0.0);
+        assert_eq!(Arithmetic::exp(f32::NEG_INFINITY), 0.0);
+        assert_eq!(Arithmetic::exp(0f32), 1.0);
     }
 }

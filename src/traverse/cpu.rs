@@ -6,7 +6,7 @@ use super::boundary::{Beam, Candidate};
 use super::{Geometry, Values};
 use crate::cell::{Face, Frame};
 use crate::image::Image;
-use crate::integral::{Exact, Light};
+use crate::integral::{Batch, Exact, Light};
 use crate::mesh::faces::BOUNDARY;
 use crate::view::{Blend, Projection, View};
 use glam::DVec2;
@@ -87,6 +87,7 @@ struct Tracer<'a, const N: usize> {
     both_ways: bool,
     candidates: Vec<Candidate>,
     entries: Vec<Entry>,
+    batch: Batch,
     counts: Counts,
 }
 
@@ -104,6 +105,7 @@ impl<'a, const N: usize> Tracer<'a, N> {
             both_ways,
             candidates: vec![],
             entries: vec![],
+            batch: Batch::default(),
             counts: Counts::default(),
         }
     }
@@ -190,6 +192,7 @@ impl<'a, const N: usize> Tracer<'a, N> {
         anyhow: bool,
         gathered: &mut Gathered<N>,
     ) -> bool {
+        self.batch.clear();
         if !self.find_entries(frame, pixel) && !anyhow {
             return false;
         }
@@ -202,6 +205,7 @@ impl<'a, const N: usize> Tracer<'a, N> {
                 return false;
             }
         }
+        self.batch.flush(self.exact.direct, &mut gathered.light);
         true
     }
 
@@ -279,9 +283,9 @@ impl<'a, const N: usize> Tracer<'a, N> {
     }
 
     #[inline(always)]
-    fn gather(&self, front: [f32; N], back: [f32; N], length: f64, gathered: &mut Gathered<N>) {
+    fn gather(&mut self, front: [f32; N], back: [f32; N], length: f64, gathered: &mut Gathered<N>) {
         if self.view.blend() == Blend::Composite {
-            self.exact.add(&front, &back, length as f32, &mut gathered.light);
+            self.batch.add(self.exact, &front, &back, length as f32, &mut gathered.light);
         } else if front.iter().chain(&back).all(|v| v.is_finite()) {
             for v in [front, back] {
                 if gathered.largest.is_none_or(|l| v[N - 1] > l[N - 1]) {
