@@ -279,9 +279,9 @@ pub(crate) fn draw(
     threads: usize,
 ) -> Result<Drawn> {
     let mut renderer = Renderer::new(threads)?;
-    renderer.set_mesh(mesh, tetrahedra)?;
+    renderer.set_mesh(mesh, tetrahedra);
     renderer.set_field(field)?;
-    renderer.set_transfer(transfer)?;
+    renderer.set_transfer(transfer);
     let start = Instant::now();
     let image = progress::during("drawing", |p| renderer.render(view, p))?;
     Ok(Drawn { image, stats: renderer.stats().clone(), first_frame_ms: ms(start) })
