@@ -1,5 +1,7 @@
 //! The program as a user meets it: what it writes, what it says, and how it exits.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot set up its files has failed")]
+
 use assert_cmd::Command;
 use halite::image::Image;
 use std::fmt::Write;
