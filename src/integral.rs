@@ -23,9 +23,6 @@ const OPAQUE_EXTINCTION: f64 = 1e15;
 /// Optical depth beyond which e^{−T} is nothing in f32.
 const DEEP: f64 = 18.0;
 
-/// Half the width, in normalised scalars, that an opaque knot is given so that no ray can step over it.
-const OPAQUE_KNOT: f64 = 1.5e-7;
-
 /// Nodes in [0, 1] and weights of the 3-point Gauss–Legendre rule.
 pub(crate) const GAUSS_3: [[f64; 2]; 3] =
     [[0.112_701_665_379_258_31, 5.0 / 18.0], [0.5, 8.0 / 18.0], [0.887_298_334_620_741_7, 5.0 / 18.0]];
@@ -199,7 +196,15 @@ struct Track<'a, R> {
 impl<'a, R: Real> Track<'a, R> {
     #[inline(always)]
     fn new(knots: &'a Knots<R>, front: R, back: R) -> Self {
-        Track { knots, i: knots.interval(front), front, rise: back - front }
+        let (mut i, rise) = (knots.interval(front), back - front);
+        if rise == R::of(0.0) {
+            // A constant that is opaque as a single value is opaque all along.
+            let opaque = |k: &[R; 4]| k[0] >= R::of(OPAQUE_EXTINCTION);
+            while i > 0 && knots.s[i - 1] == front && opaque(&knots.value[i - 1]) && !opaque(&knots.value[i]) {
+                i -= 1;
+            }
+        }
+        Track { knots, i, front, rise }
     }
 
     /// Where in [0, 1] the value leaves the interval; above 1 if it does not.
@@ -279,7 +284,7 @@ impl<R: Real> Exact<R> {
         };
         let last = normal[kind.components() - 1];
         let colored = |s: f64, side: Side| sample(transfer.color(), transfer.clamp(), s, side).map(|c| c * emission);
-        let extinction = extinction(transfer, OPAQUE_EXTINCTION * scale, OPAQUE_KNOT * last.half);
+        let extinction = extinction(transfer, OPAQUE_EXTINCTION * scale);
         let mut places: Vec<f64> = extinction.iter().map(|k| k.0).collect();
         if kind == Kind::Scalar {
             places.extend(transfer.color().iter().map(|k| k.0));
@@ -354,18 +359,25 @@ impl<R: Real> Exact<R> {
     }
 }
 
-/// Which limit of a function at a step.
+/// Which of its values a function has at a step.
 #[derive(Clone, Copy, PartialEq)]
 enum Side {
     Below,
     Above,
+    /// The greatest of all knots there, in the first channel.
+    Densest,
 }
 
 /// The limit of the piecewise linear function through `knots` at `s`; outside them the end value, or 0 without `clamp`.
 fn sample<const N: usize>(knots: &[(f64, [f64; N])], clamp: bool, s: f64, side: Side) -> [f64; N] {
+    let (below, above) = (knots.partition_point(|k| k.0 < s), knots.partition_point(|k| k.0 <= s));
     let above = match side {
-        Side::Below => knots.partition_point(|k| k.0 < s),
-        Side::Above => knots.partition_point(|k| k.0 <= s),
+        Side::Below => below,
+        Side::Above => above,
+        Side::Densest => match knots[below..above].iter().max_by(|a, b| a.1[0].total_cmp(&b.1[0])) {
+            Some(k) => return k.1,
+            None => above,
+        },
     };
     match (above, knots) {
         (_, []) => [0.0; N],
@@ -386,59 +398,64 @@ fn compile<R: Real>(mut places: Vec<f64>, normal: Normal, value: impl Fn(f64, Si
     let mut knots = Vec::with_capacity(2 * places.len());
     for s in places {
         let (x, below, above) = (normal.apply(s), value(s, Side::Below), value(s, Side::Above));
+        let densest = value(s, Side::Densest);
         knots.push((x, below));
-        if above != below {
+        if densest[0] > below[0].max(above[0]) {
+            knots.push((x, densest));
+        }
+        if above != below || densest[0] > below[0] {
             knots.push((x, above));
         }
     }
     Knots::new(knots)
 }
 
-/// Extinction per world unit of length as a piecewise linear function of the field, by the transfer function's convention.
-/// Where it is opaque it is `opaque`, for at least `width` to both sides: no ray may step over a value that is opaque alone.
-fn extinction(transfer: &TransferFunction, opaque: f64, width: f64) -> Vec<(f64, [f64; 1])> {
-    let tau = |a: f64| [transfer.extinction(a).min(opaque)];
-    let mut curve: Vec<_> = transfer.opacity().iter().map(|&(s, a)| (s, tau(a))).collect();
+/// Extinction per world unit of length as a piecewise linear function of the field, by the transfer function's convention;
+/// `opaque` on every stretch where opacity is 1 or more. A value that reaches 1 alone lets light through: the logarithm's
+/// integral is finite there.
+fn extinction(transfer: &TransferFunction, opaque: f64) -> Vec<(f64, [f64; 1])> {
+    let knots = transfer.opacity();
     if transfer.convention() == Convention::Extinction {
-        return curve;
+        return knots.iter().map(|&(s, a)| (s, [transfer.extinction(a).min(opaque)])).collect();
     }
-    let mut runs: Vec<[f64; 2]> = Vec::new();
-    for &(s, _) in transfer.opacity().iter().filter(|k| k.1 >= OPAQUE) {
-        runs.push([s, s]);
-    }
-    for w in transfer.opacity().windows(2).filter(|w| w[0].0 < w[1].0 && w[0].1 != w[1].1) {
+    // On its way to 1: what lies beyond `OPAQUE` has no length that f32 could tell.
+    let tau = |a: f64| [-(-a.min(OPAQUE)).ln_1p() / transfer.unit_distance()];
+    let mut curve = vec![];
+    for w in knots.windows(2) {
         let [(s0, a0), (s1, a1)] = [w[0], w[1]];
-        let place = |a: f64| s0 + (s1 - s0) * ((a - a0) / (a1 - a0));
         let (low, high) = (a0.min(a1), a0.max(a1));
-        curve.extend(
-            std::iter::successors(Some(low + chord(low)), |&a| Some(a + chord(a)))
-                .take_while(|&a| a < high.min(OPAQUE))
-                .map(|a| (place(a), tau(a))),
-        );
-        if high >= OPAQUE && low < OPAQUE {
-            let edge = place(OPAQUE);
-            curve.push((edge, [-(-OPAQUE).ln_1p() / transfer.unit_distance()]));
-            runs.push(if a0 < a1 { [edge, s1] } else { [s0, edge] });
-        } else if low >= OPAQUE {
-            runs.push([s0, s1]);
+        let place = |a: f64| s0 + (s1 - s0) * ((a - a0) / (a1 - a0));
+        if low >= OPAQUE {
+            curve.extend([(s0, [opaque]), (s1, [opaque])]);
+            continue;
+        }
+        if a0 >= OPAQUE {
+            curve.push((s0, [opaque]));
+        }
+        let mut rise: Vec<_> = std::iter::successors(Some(low), |&a| Some(a + chord(a)))
+            .take_while(|&a| a < high.min(OPAQUE))
+            .chain([high.min(OPAQUE)])
+            .map(|a| (place(a), tau(a)))
+            .collect();
+        if high > 1.0 {
+            rise.extend([(place(1.0), tau(1.0)), (place(1.0), [opaque]), (place(high), [opaque])]);
+        } else {
+            rise.push((place(high), tau(high)));
+        }
+        if a1 < a0 {
+            rise.reverse();
+        }
+        match s0 < s1 && a0 != a1 {
+            true => curve.extend(rise),
+            false => curve.extend([(s0, tau(a0)), (s1, tau(a1))]),
         }
     }
-    // Stable, so that the two knots of a step keep their order.
-    curve.sort_by(|a, b| a.0.total_cmp(&b.0));
-    runs.iter_mut().for_each(|r| *r = [r[0] - width, r[1] + width]);
-    runs.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    runs.dedup_by(|next, run| {
-        let touches = next[0] <= run[1];
-        if touches {
-            run[1] = run[1].max(next[1]);
+    // Beyond the outer knots their values hold: there an opaque one is a stretch.
+    for (k, end) in [knots.first(), knots.last()].into_iter().enumerate() {
+        if let Some(&(s, a)) = end {
+            let value = if a >= OPAQUE { [opaque] } else { tau(a) };
+            curve.insert(if k == 0 { 0 } else { curve.len() }, (s, value));
         }
-        touches
-    });
-    for [low, high] in runs {
-        let before = sample(&curve, transfer.clamp(), low, Side::Below);
-        let after = sample(&curve, transfer.clamp(), high, Side::Above);
-        let (from, to) = (curve.partition_point(|k| k.0 < low), curve.partition_point(|k| k.0 <= high));
-        curve.splice(from..to, [(low, before), (low, [opaque]), (high, [opaque]), (high, after)]);
     }
     curve
 }
@@ -583,7 +600,7 @@ mod tests {
         let color = vec![(0.0, [1.0; 3])];
         let opacity = vec![(-1.0, 0.0), (0.0, 0.7), (0.5, 0.2), (0.9, 0.999)];
         let transfer = TransferFunction::new(color, opacity, 0.3).unwrap().with_convention(Convention::Opacity);
-        let curve = extinction(&transfer, 1e15, 1e-7);
+        let curve = extinction(&transfer, 1e15);
         for i in 0..100_000 {
             let s = -1.0 + 1.9 * (f64::from(i) + 0.37) / 1e5;
             let (got, want) = (sample(&curve, true, s, Side::Above)[0], transfer.extinction(transfer.opacity_at(s)));
@@ -592,23 +609,34 @@ mod tests {
     }
 
     #[test]
-    fn an_opaque_value_ends_the_ray_however_narrow() {
+    fn a_stretch_of_opacity_1_ends_the_ray_and_a_point_does_not() {
         let color = vec![(-1.0, [1.0, 0.0, 0.0]), (1.0, [0.0, 1.0, 0.0])];
-        for at in [-0.7, 0.0, 0.6] {
-            let opacity = vec![(-1.0, 0.0), (at, 1.0), (1.0, 0.0)];
-            let transfer =
-                TransferFunction::new(color.clone(), opacity, 1e6).unwrap().with_convention(Convention::Opacity);
-            let exact = exact::<f32>(&transfer, Kind::Scalar);
-            let at = at as f32;
-            for (f, b) in [(-0.9, 0.9), (0.9, -0.9), (at, 0.9), (-0.9, at), (at, at), (at - 1e-3, at + 1e-3)] {
-                let mut light = Light::<f32>::none();
-                exact.add(&[f], &[b], 1e-4, &mut light);
-                assert!(light.through < 1e-6, "{at}: {f} to {b} lets {} through", light.through);
-                assert!((light.color[1] - (at + 1.0) / 2.0).abs() < 1e-4);
-            }
+        let make = |opacity: &[(f64, f64)]| {
+            let t = TransferFunction::new(color.clone(), opacity.to_vec(), 1e6).unwrap();
+            exact::<f32>(&t.with_convention(Convention::Opacity), Kind::Scalar)
+        };
+        let through = |exact: &Exact<f32>, f: f32, b: f32| {
             let mut light = Light::<f32>::none();
-            exact.add(&[at + 1e-3], &[0.9], 1e-4, &mut light);
-            assert!(light.through > 0.99);
+            exact.add(&[f], &[b], 1e-4, &mut light);
+            light
+        };
+        let stretches = [
+            make(&[(-1.0, 0.0), (0.2, 1.0), (0.3, 1.0), (1.0, 0.0)]),
+            make(&[(-1.0, 0.0), (0.0, 0.0), (0.4, 2.0), (0.401, 0.0)]),
+        ];
+        for exact in &stretches {
+            for (f, b) in [(-0.9, 0.9), (0.9, -0.9), (0.25, 0.25), (0.21, 0.22)] {
+                let light = through(exact, f, b);
+                assert!(light.through < 1e-6, "{f} to {b} lets {} through", light.through);
+            }
+            assert!(through(exact, -0.9, 0.1).through > 0.99);
+        }
+        let point = make(&[(-1.0, 0.0), (0.2, 1.0), (1.0, 0.0)]);
+        assert!(through(&point, -0.9, 0.9).through > 0.99);
+        assert!(through(&point, 0.2, 0.2).through < 1e-6, "a constant field at the point is a stretch");
+        let outside = make(&[(-0.5, 1.0), (0.0, 0.0), (0.5, 1.0)]);
+        for (f, b) in [(-0.9, -0.8), (0.6, 0.7), (0.9, -0.9)] {
+            assert!(through(&outside, f, b).through < 1e-6);
         }
     }
 

@@ -93,6 +93,11 @@ impl Renderer {
         Ok(Renderer { pool, mesh: None, field: None, transfer: None, exact: None, stats })
     }
 
+    /// Runs `work`, such as reading a file, on the renderer's threads.
+    pub fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
+        self.pool.install(work)
+    }
+
     /// Draws another mesh from now on, split into `tetrahedra`; the field must be set again.
     pub fn set_mesh(&mut self, mesh: &Mesh, tetrahedra: Tetrahedra) {
         let start = Instant::now();

@@ -1,5 +1,7 @@
 //! The reader of mesh files: what writers write is read as it was meant, what is damaged is refused by name.
 
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
+
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use halite::mesh::{Array, Mesh, Values};
@@ -204,7 +206,7 @@ fn floats(values: &Values) -> Vec<f64> {
 }
 
 fn coordinates(mesh: &Mesh) -> Vec<f64> {
-    mesh.points().iter().flat_map(|p| p.to_array()).collect()
+    mesh.points().iter().flat_map(glam::DVec3::to_array).collect()
 }
 
 fn assert_holds(mesh: &Mesh, piece: &Piece, what: impl std::fmt::Debug) {

@@ -307,7 +307,7 @@ impl Bytes<'_> {
     fn after(mut self, header: u64) -> Result<Self, Fault> {
         let characters = header.div_ceil(3) * 4;
         let mut padding = *b"=";
-        if self.base64 && header % 3 != 0 {
+        if self.base64 && !header.is_multiple_of(3) {
             padding = *b"A";
             let at = self.start + characters - (3 - header % 3);
             if at < self.end {

@@ -366,34 +366,35 @@ impl Grid<'_> {
             })
         };
         let (offsets, types, connectivity) = (find("offsets")?, find("types")?, find("connectivity")?);
-        let offsets = self.indices(offsets, piece.cells, |cell, offset| {
-            offset.ok_or_else(|| format!("the offset of cell {cell} is not a whole number from 0 up"))
+        let offsets = self.indices(offsets, piece.cells, Some, |cell, _| {
+            format!("the offset of cell {cell} is not a whole number from 0 up")
         })?;
-        let types = self.indices(types, piece.cells, |cell, kind| {
-            kind.and_then(|kind| u8::try_from(kind).ok())
-                .ok_or_else(|| format!("the type of cell {cell} is not in 0..=255"))
-        })?;
+        let narrow = |kind| u8::try_from(kind).ok();
+        let types =
+            self.indices(types, piece.cells, narrow, |cell, _| format!("the type of cell {cell} is not in 0..=255"))?;
         let length = offsets.last().copied().unwrap_or_default();
-        let connectivity = self.indices(connectivity, length, |entry, point| {
-            point.filter(|point| *point < piece.points).map(|point| (base + point) as u32).ok_or_else(|| {
-                let cell = offsets.partition_point(|end| *end <= entry as u64);
-                let point = point.map_or("a negative point".to_owned(), |point| format!("point {point}"));
-                format!("cell {cell} names {point}, but there are {} points", piece.points)
-            })
+        let shift = |point| (point < piece.points).then(|| (base + point) as u32);
+        let connectivity = self.indices(connectivity, length, shift, |entry, point| {
+            let cell = offsets.partition_point(|end| *end <= entry as u64);
+            let point = point.map_or("a negative point".to_owned(), |point| format!("point {point}"));
+            format!("cell {cell} names {point}, but there are {} points", piece.points)
         })?;
         Ok(Cells { types, offsets, connectivity })
     }
 
-    /// Reads indices of any number type; `check` gets the place of one and its value if it is a whole number from 0 up.
+    /// Reads indices of any number type. `check` turns each into what is kept, or `explain` says what is wrong with it: it gets
+    /// the place of the number, and its value if it is a whole number from 0 up.
     fn indices<U: bytemuck::Pod + Send>(
         &self,
         array: &DataArray,
         count: u64,
-        check: impl Fn(usize, Option<u64>) -> Result<U, String> + Sync,
+        check: impl Fn(u64) -> Option<U> + Sync,
+        explain: impl Fn(usize, Option<u64>) -> String + Sync,
     ) -> Result<Vec<U>> {
         with_kind!(array.kind, T => self.store.read(array, count, &self.progress, |first, numbers: &[T], out| {
             for (i, (number, out)) in numbers.iter().zip(out).enumerate() {
-                *out = check(first + i, number.index())?;
+                let index = number.index();
+                *out = index.and_then(&check).ok_or_else(|| explain(first + i, index))?;
             }
             Ok(())
         }))
