@@ -157,10 +157,10 @@ fn opacity_points(list: &[(f64, [f64; 3])]) -> Vec<(f64, f64)> {
         let ((x0, [a, middle, sharpness]), (x1, [b, ..])) = (w[0], w[1]);
         let middle = middle.clamp(1e-5, 1.0 - 1e-5);
         let at = x0 + (x1 - x0) * middle;
-        if x1 <= x0 || (sharpness < 0.01 && middle == 0.5) {
-        } else if sharpness > 0.99 {
+        let straight = x1 <= x0 || (sharpness < 0.01 && middle == 0.5);
+        if !straight && sharpness > 0.99 {
             points.extend([(at, a), (at, b)]);
-        } else {
+        } else if !straight {
             // Each half is smooth, and so safe to bisect.
             for (from, to, half) in [(x0, at, 0.0), (at, x1, 0.5)] {
                 let f = |u: f64| [sharpened(a, b, half + u / 2.0, sharpness)];

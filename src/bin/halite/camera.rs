@@ -6,6 +6,7 @@ use glam::{DQuat, DVec3};
 use halite::view::{Camera, Projection};
 
 #[derive(Args)]
+#[group(skip)]
 #[command(next_help_heading = "Camera")]
 pub(crate) struct Options {
     /// Turn around the view-up axis, in degrees to the right

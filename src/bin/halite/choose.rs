@@ -88,10 +88,10 @@ pub(crate) fn camera(mesh: &Mesh, tetrahedra: &Tetrahedra) -> Camera {
     let far = |r: f64, p: u32| r.max(mesh.points()[p as usize].distance(center));
     let radius = tetrahedra.corners.as_flattened().iter().fold(0.0, |r, &p| far(r, p));
     let view_angle = 30.0_f64;
-    // A mesh may be one point, and still needs a camera.
+    // All cells may be flat at one place, and still need a camera.
     let radius = if radius > 0.0 { radius } else { 1.0 };
     Camera {
-        position: center + direction() * (radius / (view_angle.to_radians() / 2.0).sin()),
+        position: center + direction() * (1.05 * radius / (view_angle.to_radians() / 2.0).sin()),
         focal_point: center,
         view_up: DVec3::Z,
         projection: Projection::Perspective { view_angle },
@@ -201,7 +201,11 @@ impl Sample {
             share[(((s - lo) / width).max(0.0) as usize).min(BANDS - 1)] += v;
         }
         let total = share.iter().sum::<f64>().max(f64::MIN_POSITIVE);
-        let peak = share.map(|v| 1.0 / (v / total * BANDS as f64 + 0.1));
+        let peak = share.map(|v| {
+            // Twice as steep above the mean frequency, or what fills the mesh would veil it.
+            let frequency = v / total * BANDS as f64;
+            1.0 / ((frequency + 0.1) * (1.0 + frequency))
+        });
         let mut knots = Vec::new();
         for (i, p) in peak.into_iter().enumerate() {
             let (from, next) = (lo + width * i as f64, peak[(i + 1).min(BANDS - 1)]);

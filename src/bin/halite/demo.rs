@@ -1,7 +1,9 @@
-use crate::{choose, output, render};
+use crate::render::{self, Job};
+use crate::{choose, output};
 use anyhow::Result;
 use clap::Args;
 use halite::mesh::{cells::Tetrahedra, generate};
+use halite::render::Renderer;
 use halite::scene::Scalars;
 use std::path::PathBuf;
 
@@ -16,15 +18,20 @@ pub(crate) struct Options {
 /// Cells along the demo's side n: 6 · 3 n · n² tetrahedra.
 const SIDE: usize = 24;
 
-pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
+pub(crate) fn run(options: &Options, renderer: &mut Renderer) -> Result<()> {
     output::check_picture(&options.out)?;
+    let job = renderer.install(prepare)?;
+    let background = job.scene.background;
+    let drawn = render::draw(job, renderer)?;
+    drawn.image.save(&options.out, render::backdrop(background, None))?;
+    output::print(&format!("{}\n", options.out.display()))
+}
+
+fn prepare() -> Result<Job> {
     let mesh = generate::demo(SIDE);
     let tetrahedra = Tetrahedra::new(&mesh)?;
     let scalars = Scalars { name: "s".into(), association: None, component: None };
     let field = scalars.field(&mesh)?;
     let scene = choose::scene(&mesh, &tetrahedra, scalars, &field, Default::default())?;
-    let (view, _) = scene.view()?;
-    let drawn = render::draw(&mesh, tetrahedra, &field, &scene.transfer, &view, threads)?;
-    drawn.image.save(&options.out, render::backdrop(scene.background, None))?;
-    output::print(&format!("{}\n", options.out.display()))
+    Ok(Job { mesh, tetrahedra, field, scene, load_ms: 0.0, split_ms: 0.0 })
 }

@@ -9,8 +9,9 @@ mod parse;
 mod progress;
 mod render;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::{Parser, Subcommand};
+use halite::render::Renderer;
 use std::process::ExitCode;
 
 /// Draws unstructured grids as volumes: every pixel is the integral of the field that the mesh defines.
@@ -54,10 +55,10 @@ fn main() -> ExitCode {
 }
 
 fn run(cli: Cli) -> Result<()> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(cli.threads).thread_name(|i| format!("halite-{i}")).build();
-    pool.context("the threads cannot be started")?.install(|| match cli.command {
-        Command::Render(options) => render::run(&options, cli.threads),
-        Command::Info(options) => info::run(&options),
-        Command::Demo(options) => demo::run(&options, cli.threads),
-    })
+    let mut renderer = Renderer::new(cli.threads)?;
+    match cli.command {
+        Command::Render(options) => render::run(&options, &mut renderer),
+        Command::Info(options) => renderer.install(|| info::run(&options)),
+        Command::Demo(options) => demo::run(&options, &mut renderer),
+    }
 }

@@ -1,5 +1,4 @@
 //! What the program says and writes.
-#![allow(clippy::print_stderr, reason = "the one place where the program says why it failed")]
 
 use anyhow::{Context, Result, bail};
 use std::io::{ErrorKind, Write};

@@ -8,7 +8,7 @@ use halite::render::{Renderer, Stats};
 use halite::scene::{Scalars, Scene};
 use halite::transfer::TransferFunction;
 use halite::transfer::colormap::ColorMap;
-use halite::view::{Blend, ClippingPlane, View};
+use halite::view::{Blend, ClippingPlane};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -107,19 +107,41 @@ enum Integral {
     Exact,
 }
 
-pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
+pub(crate) fn run(options: &Options, renderer: &mut Renderer) -> Result<()> {
     output::check_picture(&options.out)?;
     if let Some(path) = &options.stats {
         output::check(path)?;
     }
+    let job = renderer.install(|| prepare(options))?;
+    let background = job.scene.background;
+    let drawn = draw(job, renderer)?;
+    drawn.image.save(&options.out, backdrop(background, drawn.behind.as_deref()))?;
+    if let Some(path) = &options.stats {
+        let text = format!("{:#}\n", drawn.report());
+        std::fs::write(path, text).with_context(|| path.display().to_string())?;
+    }
+    Ok(())
+}
+
+/// Everything that a picture takes, and how long it took to get.
+pub(crate) struct Job {
+    pub(crate) mesh: Mesh,
+    pub(crate) tetrahedra: Tetrahedra,
+    pub(crate) field: Field,
+    pub(crate) scene: Scene,
+    pub(crate) load_ms: f64,
+    pub(crate) split_ms: f64,
+}
+
+fn prepare(options: &Options) -> Result<Job> {
     let map = options.colormap.as_deref().map(color_map).transpose()?;
     let from_file = options.input.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
     let given = if from_file { Some(Scene::open(&options.input)?) } else { None };
     check_device(given.as_ref()).with_context(|| options.input.display().to_string())?;
 
     let start = Instant::now();
-    let path = given.as_ref().map_or(&options.input, |scene| &scene.mesh);
-    let mesh = progress::during("reading", |p| halite::io::open(path, p))?;
+    let path = given.as_ref().map_or(options.input.clone(), |scene| scene.mesh.clone());
+    let mesh = progress::during("reading", |p| halite::io::open(&path, p))?;
     let load_ms = ms(start);
     let start = Instant::now();
     let tetrahedra = Tetrahedra::new(&mesh).with_context(|| path.display().to_string())?;
@@ -151,15 +173,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
         None if from_file => Some(scene.background.unwrap_or_default()),
         None => scene.background,
     };
-    let (view, behind) = scene.view()?;
-
-    let drawn = draw(&mesh, tetrahedra, &field, &scene.transfer, &view, threads)?;
-    drawn.image.save(&options.out, backdrop(scene.background, behind.as_deref()))?;
-    if let Some(path) = &options.stats {
-        let json = drawn.report(view.size(), load_ms, split_ms);
-        std::fs::write(path, format!("{json:#}\n")).with_context(|| path.display().to_string())?;
-    }
-    Ok(())
+    Ok(Job { mesh, tetrahedra, field, scene, load_ms, split_ms })
 }
 
 impl Options {
@@ -266,34 +280,33 @@ fn tell_skipped(skipped: &cells::Skipped) {
 /// A picture, and what it took.
 pub(crate) struct Drawn {
     pub(crate) image: Image,
+    behind: Option<halite::scene::Backdrop>,
     stats: Stats,
+    load_ms: f64,
+    split_ms: f64,
     first_frame_ms: f64,
 }
 
-pub(crate) fn draw(
-    mesh: &Mesh,
-    tetrahedra: Tetrahedra,
-    field: &Field,
-    transfer: &TransferFunction,
-    view: &View,
-    threads: usize,
-) -> Result<Drawn> {
-    let mut renderer = Renderer::new(threads)?;
-    renderer.set_mesh(mesh, tetrahedra);
-    renderer.set_field(field)?;
-    renderer.set_transfer(transfer);
+pub(crate) fn draw(job: Job, renderer: &mut Renderer) -> Result<Drawn> {
+    let Job { mesh, tetrahedra, field, scene, load_ms, split_ms } = job;
+    let (view, behind) = scene.view()?;
+    renderer.set_mesh(&mesh, tetrahedra);
+    renderer.set_field(&field)?;
+    renderer.set_transfer(&scene.transfer);
+    // The renderer has its own copy, and the meshes that people draw are large.
+    drop((mesh, field));
     let start = Instant::now();
-    let image = progress::during("drawing", |p| renderer.render(view, p))?;
-    Ok(Drawn { image, stats: renderer.stats().clone(), first_frame_ms: ms(start) })
+    let image = progress::during("drawing", |p| renderer.render(&view, p))?;
+    Ok(Drawn { image, behind, stats: renderer.stats().clone(), load_ms, split_ms, first_frame_ms: ms(start) })
 }
 
 impl Drawn {
-    fn report(&self, size: [u32; 2], load_ms: f64, split_ms: f64) -> serde_json::Value {
+    fn report(&self) -> serde_json::Value {
         let s = &self.stats;
         serde_json::json!({
             "engine": s.engine, "device": s.device, "adapter": s.adapter,
-            "size": size, "cells": s.cells, "tetrahedra": s.tetrahedra,
-            "load_ms": load_ms, "faces_ms": split_ms + s.faces_ms, "upload_ms": s.upload_ms,
+            "size": self.image.size, "cells": s.cells, "tetrahedra": s.tetrahedra,
+            "load_ms": self.load_ms, "faces_ms": self.split_ms + s.faces_ms, "upload_ms": s.upload_ms,
             "first_frame_ms": self.first_frame_ms, "frame_ms": s.frame_ms, "transfer_edit_ms": null,
             "steps": s.steps, "repaired_rays": s.repaired_rays,
             "device_bytes": s.device_bytes, "peak_bytes": peak_bytes(),

@@ -1,0 +1,226 @@
+//! The program as a user meets it: what it writes, what it says, and how it exits.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot set up its files has failed")]
+
+use assert_cmd::Command;
+use halite::image::Image;
+use std::fmt::Write;
+use std::path::PathBuf;
+use std::process::Stdio;
+use tempfile::TempDir;
+
+/// A folder with a small mesh `cube.vtu`, and a scene of it.
+struct Place(TempDir);
+
+/// What a run left: exit code, stdout, stderr.
+struct Ran(Option<i32>, String, String);
+
+impl Place {
+    fn new() -> Self {
+        let place = Place(TempDir::new().unwrap());
+        place.write("cube.vtu", &cube());
+        place
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        std::fs::write(self.path(name), text).unwrap();
+    }
+
+    /// Runs the program in the folder, with the words of `arguments`.
+    fn run(&self, arguments: &str) -> Ran {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_halite"));
+        command.current_dir(self.0.path()).env_remove("HALITE_DEVICE").args(arguments.split_whitespace());
+        let output = command.output().unwrap();
+        let text = |bytes| String::from_utf8(bytes).unwrap();
+        Ran(output.status.code(), text(output.stdout), text(output.stderr))
+    }
+
+    /// A run that fails with one line.
+    fn fails(&self, arguments: &str, parts: &[&str]) {
+        let Ran(code, out, err) = self.run(arguments);
+        assert_eq!((code, out.as_str()), (Some(1), ""), "{arguments}: {err}");
+        assert!(err.starts_with("halite: ") && err.trim_end().lines().count() == 1, "{arguments}: {err}");
+        assert!(parts.iter().all(|p| err.contains(p)), "{arguments}: no {parts:?} in {err}");
+    }
+
+    /// A run that is not understood.
+    fn misused(&self, arguments: &str, part: &str) {
+        let Ran(code, _, err) = self.run(arguments);
+        assert_eq!(code, Some(2), "{arguments}: {err}");
+        assert!(err.contains(part), "{arguments}: no {part} in {err}");
+    }
+
+    fn succeeds(&self, arguments: &str) -> String {
+        let Ran(code, out, err) = self.run(arguments);
+        assert_eq!((code, err.as_str()), (Some(0), ""), "{arguments}");
+        out
+    }
+}
+
+/// Eight hexahedra and a triangle; "s" is x + y + z, "v" points along x, "c" counts cells.
+fn cube() -> String {
+    let lattice = |n: usize| (0..n * n * n).map(move |i| [i % n, i / n % n, i / n / n]);
+    let index = |[i, j, k]: [usize; 3]| i + 3 * (j + 3 * k);
+    let (mut points, mut s, mut v, mut cells) = (String::new(), String::new(), String::new(), String::new());
+    for [i, j, k] in lattice(3) {
+        write!(points, "{i} {j} {k} ").unwrap();
+        write!(s, "{} ", i + j + k).unwrap();
+        write!(v, "{i} 0 0 ").unwrap();
+    }
+    for [i, j, k] in lattice(2) {
+        for [a, b, c] in [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]] {
+            write!(cells, "{} ", index([i + a, j + b, k + c])).unwrap();
+        }
+    }
+    format!(
+        r#"<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian"><UnstructuredGrid>
+        <Piece NumberOfPoints="27" NumberOfCells="9">
+        <PointData>
+        <DataArray type="Int64" Name="GlobalNodeId" format="ascii">{ids}</DataArray>
+        <DataArray type="Float32" Name="v" NumberOfComponents="3" format="ascii">{v}</DataArray>
+        <DataArray type="Float64" Name="s" format="ascii">{s}</DataArray></PointData>
+        <CellData><DataArray type="Float32" Name="c" format="ascii">1 2 3 4 5 6 7 nan 9</DataArray></CellData>
+        <Points><DataArray type="Float64" NumberOfComponents="3" format="ascii">{points}</DataArray></Points>
+        <Cells><DataArray type="Int64" Name="connectivity" format="ascii">{cells} 0 1 3</DataArray>
+        <DataArray type="Int64" Name="offsets" format="ascii">8 16 24 32 40 48 56 64 67</DataArray>
+        <DataArray type="UInt8" Name="types" format="ascii">12 12 12 12 12 12 12 12 5</DataArray></Cells>
+        </Piece></UnstructuredGrid></VTKFile>"#,
+        ids = (0..27).map(|i| i.to_string()).collect::<Vec<_>>().join(" "),
+    )
+}
+
+const SCENE: &str = r#"{"mesh": "cube.vtu", "scalars": {"name": "s", "association": "point"},
+    "color": [[0, 1, 0, 0], [6, 0, 0, 1]], "opacity": [[0, 0.1], [6, 1]], "unit_distance": 1,
+    "camera": {"position": [1, 1, 12], "focal_point": [1, 1, 1], "view_up": [0, 1, 0], "view_angle": 15},
+    "size": [12, 8]}"#;
+
+#[test]
+fn usage() {
+    let place = Place::new();
+    place.misused("", "Usage: halite");
+    place.misused("paint", "unrecognized subcommand");
+    place.misused("render cube.vtu", "--out");
+    place.misused("render cube.vtu --out x.png --colour red", "--colour");
+    for size in ["640", "0x10", "axb", "10x"] {
+        place.misused(&format!("render cube.vtu --out x.png --size {size}"), "--size");
+    }
+    place.misused("render cube.vtu --out x.png --engine warp", "traverse");
+    place.misused("render cube.vtu --out x.png --range 1:0", "--range");
+    place.misused("render cube.vtu --out x.png --background 1,2", "--background");
+    place.misused("render cube.vtu --out x.png --clip 0,0,0,0,0,0", "normal");
+    assert!(place.succeeds("--version").starts_with("halite "));
+    assert!(place.succeeds("render --help").contains("--unit-distance"));
+}
+
+#[test]
+fn failures_are_one_line() {
+    let place = Place::new();
+    place.write("scene.json", SCENE);
+    place.write("typo.json", &SCENE.replace("unit_distance", "unit_distanse"));
+    place.write("engine.json", &SCENE.replace("\"size\"", "\"engine\": \"warp\", \"size\""));
+    place.write("lost.json", &SCENE.replace("cube.vtu", "sub/lost.vtu"));
+    place.fails("render none.vtu --out x.png", &["none.vtu"]);
+    place.fails("info none.vtu", &["none.vtu"]);
+    place.fails("render none.json --out x.png", &["none.json"]);
+    place.fails("render cube.vtu --out x.png --scalars t", &["cube.vtu", "\"t\"", "\"s\"", "\"v\"", "\"c\""]);
+    place.fails("render cube.vtu --out x.png --scalars v --component 3", &["component 3"]);
+    place.fails("render typo.json --out x.png", &["typo.json", "unit_distanse", "unit_distance"]);
+    place.fails("render engine.json --out x.png", &["engine.json", "engine", "warp", "traverse"]);
+    place.fails("render lost.json --out x.png", &["lost.vtu"]);
+    place.fails("render scene.json --out x.gif", &["x.gif", ".png"]);
+    place.fails("render scene.json --out no/x.png", &["no/x.png", "folder"]);
+    place.fails("render scene.json --out x.png --stats no/x.json", &["no/x.json", "folder"]);
+    place.fails("render cube.vtu --out x.png --colormap jet", &["jet", "viridis"]);
+    place.fails("render cube.vtu --out x.png --colormap none.json", &["none.json"]);
+    place.fails("render cube.vtu --out x.png --opacity 1:0,0:1", &["ascend"]);
+    place.fails("render cube.vtu --out x.png --position 1,1,1 --focal-point 1,1,1", &["the same"]);
+    place.fails("demo --out no/x.png", &["no/x.png"]);
+    assert!(!place.path("x.png").exists());
+}
+
+#[test]
+fn info_tells_what_is_there() {
+    let place = Place::new();
+    let told = place.succeeds("info cube.vtu");
+    for part in ["9 cells", "27 points", "x  0 to 2", "8  hexahedron", "1  triangle", "no volume", "48  tetrahedra"] {
+        assert!(told.contains(part), "no {part} in {told}");
+    }
+    for part in ["3 x f32", "0 to 6", "1 to 9 (1 NaN)", "48  boundary faces", "1  components", "\"s\" if no other"] {
+        assert!(told.contains(part), "no {part} in {told}");
+    }
+}
+
+#[test]
+fn a_reader_that_has_seen_enough() {
+    let place = Place::new();
+    let mut program = std::process::Command::new(env!("CARGO_BIN_EXE_halite"));
+    program.arg("info").arg(place.path("cube.vtu"));
+    let mut program = program.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    drop(program.stdout.take());
+    let output = program.wait_with_output().unwrap();
+    assert_eq!((output.status.code(), output.stderr.as_slice()), (Some(0), &b""[..]));
+}
+
+#[test]
+fn a_mesh_alone() {
+    let place = Place::new();
+    for name in ["x.npy", "x.exr"] {
+        assert_eq!(place.succeeds(&format!("render cube.vtu --out {name} --size 40x30")), "");
+        let image = Image::open(&place.path(name)).unwrap();
+        assert_eq!(image.size, [40, 30]);
+        let opacity = |i: u32, j: u32| image.pixels[(j * 40 + i) as usize][3];
+        assert!((0.2..0.999).contains(&opacity(20, 15)), "{}", opacity(20, 15));
+        assert_eq!(opacity(0, 0), 0.0);
+    }
+    place.succeeds("render cube.vtu --out x.png --size 40x30 --background none --stats x.json --threads 2");
+    let png = image::open(place.path("x.png")).unwrap();
+    assert_eq!((png.width(), png.height(), png.color()), (40, 30, image::ColorType::Rgba8));
+    let stats: serde_json::Value = serde_json::from_slice(&std::fs::read(place.path("x.json")).unwrap()).unwrap();
+    assert_eq!((&stats["cells"], &stats["tetrahedra"]), (&9.into(), &48.into()), "{stats}");
+    for key in
+        ["load_ms", "faces_ms", "upload_ms", "first_frame_ms", "frame_ms", "steps", "device_bytes", "repaired_rays"]
+    {
+        assert!(stats[key].is_number(), "{key}: {stats}");
+    }
+    assert!(stats["engine"].is_string() && stats["transfer_edit_ms"].is_null());
+    for options in ["--scalars v", "--scalars c", "--scalars v --component 0 --blend maximum", "--clip 1,1,1,1,0,0"] {
+        place.succeeds(&format!("render cube.vtu --out x.npy --size 20x20 --azimuth -30 {options}"));
+    }
+}
+
+#[test]
+fn a_scene_and_options() {
+    let place = Place::new();
+    place.write("scene.json", SCENE);
+    let image = |options: &str| {
+        place.succeeds(&format!("render scene.json --out x.npy {options}"));
+        Image::open(&place.path("x.npy")).unwrap()
+    };
+    let scene = image("");
+    assert_eq!(scene.size, [12, 8]);
+    // Two units deep, s from 2 to 4: optical depth 2 (0.1 + 0.9 · 3/6).
+    let middle = |image: &Image| image.pixels[4 * 12 + 6];
+    let wanted = 1.0 - f64::exp(-2.0 * (0.1 + 0.9 * 0.5));
+    assert!((f64::from(middle(&scene)[3]) - wanted).abs() < 0.05, "{:?}", middle(&scene));
+    assert_eq!(image("--size 6x4").size, [6, 4]);
+    assert!(middle(&image("--unit-distance 10"))[3] < 0.2);
+    assert_eq!(middle(&image("--opacity 0%:0,100%:0"))[3], 0.0);
+    assert_ne!(middle(&image("--colormap grey")), middle(&scene));
+    assert_ne!(middle(&image("--range 0:3")), middle(&scene));
+    assert!(middle(&image("--clip 1,1,1,0,0,1"))[3] < middle(&scene)[3]);
+}
+
+#[test]
+fn the_demo_shows_something() {
+    let place = Place::new();
+    assert_eq!(place.succeeds("demo").trim(), "halite-demo.png");
+    let png = image::open(place.path("halite-demo.png")).unwrap().into_rgb8();
+    let mut colors: Vec<_> = png.pixels().map(|p| p.0).collect();
+    colors.sort_unstable();
+    colors.dedup();
+    assert!(colors.len() > 1000, "{} colours", colors.len());
+}
