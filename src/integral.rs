@@ -647,8 +647,8 @@ mod tests {
             let s = front + (back - front) * (i as f64 + 0.5) / n as f64;
             let (c, t) = (transfer.color_at(s), transfer.extinction(transfer.opacity_at(s)) * length / n as f64);
             let alpha = -(-t).exp_m1();
-            for k in 0..3 {
-                light.color[k] += light.through * alpha * c[k];
+            for (sum, c) in light.color.iter_mut().zip(c) {
+                *sum += light.through * alpha * c;
             }
             light.through *= 1.0 - alpha;
         }

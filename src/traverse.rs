@@ -61,7 +61,7 @@ impl Geometry {
         let mut used = vec![false; points.len()];
         corners.iter().flatten().for_each(|&p| used[weld(p) as usize] = true);
         let used: Vec<u32> = (0..points.len() as u32).filter(|&p| used[p as usize]).collect();
-        let point_of = along_curve(&used, |p| normalised(p));
+        let point_of = along_curve(&used, normalised);
         let mut new_point = vec![0; points.len()];
         point_of.iter().enumerate().for_each(|(new, &old)| new_point[old as usize] = new as u32);
 

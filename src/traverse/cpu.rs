@@ -244,7 +244,7 @@ impl<'a, const N: usize> Tracer<'a, N> {
         let mut front = self.value(cell, &ids, &weights);
         loop {
             self.counts.steps += 1;
-            let Some(c) = cells.get(cell as usize) else { return None };
+            let c = cells.get(cell as usize)?;
             let apex = c.corners.iter().fold(ids[0] ^ ids[1] ^ ids[2], |x, p| x ^ p);
             let dropped = face.step(frame.project(points[apex as usize]));
             let left_behind = std::mem::replace(&mut ids[dropped], apex);
