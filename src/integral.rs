@@ -13,7 +13,7 @@
 //! where nothing more can be seen.
 
 use crate::field::{Kind, Normal};
-use crate::real::{Arithmetic, Lanes, Real};
+use crate::real::Real;
 use crate::transfer::{Convention, Emission, OPAQUE, TransferFunction};
 
 /// Extinction that stands for "opaque", per normalised unit of length: even the thinnest slab that f32 can tell from
@@ -53,25 +53,9 @@ pub struct Piece<A> {
     pub back: A,
 }
 
-impl<A: Arithmetic> Piece<A> {
-    /// A piece of optical depths `x` (τ_f l) and `y` (τ_b l), both within [0, [`PANEL`]]: no decisions, so for lanes as well.
-    #[inline(always)]
-    pub fn moderate(x: A, y: A, direct: bool) -> Self {
-        gauss(
-            &GAUSS_6,
-            x,
-            y,
-            A::of(0.0),
-            A::of(1.0),
-            direct,
-            Piece { alpha: A::of(0.0), front: A::of(0.0), back: A::of(0.0) },
-        )
-    }
-}
-
 /// Adds to `sum` what the panel of `width` at `from`, both in [0, 1], emits and absorbs.
 #[inline(always)]
-fn gauss<A: Arithmetic, const N: usize>(
+fn gauss<A: Real, const N: usize>(
     rule: &[[f64; 2]; N],
     x: A,
     y: A,
@@ -80,11 +64,11 @@ fn gauss<A: Arithmetic, const N: usize>(
     direct: bool,
     mut sum: Piece<A>,
 ) -> Piece<A> {
-    let (zero, one, half) = (A::of(0.0), A::of(1.0), A::of(0.5));
+    let (one, half) = (A::of(1.0), A::of(0.5));
     for [node, weight] in rule {
         let u = from + width * A::of(*node);
         let rise = (y - x) * u;
-        let seen = (zero - (x + rise * half) * u).exp() * (width * A::of(*weight));
+        let seen = (-((x + rise * half) * u)).exp() * (width * A::of(*weight));
         let absorbed = (x + rise) * seen;
         let emitted = if direct { seen } else { absorbed };
         sum.alpha = sum.alpha + absorbed;
@@ -95,14 +79,21 @@ fn gauss<A: Arithmetic, const N: usize>(
 }
 
 impl<R: Real> Piece<R> {
+    const NONE: fn() -> Self = || Piece { alpha: R::of(0.0), front: R::of(0.0), back: R::of(0.0) };
+
+    /// As [`Piece::new`] for depths up to [`PANEL`]; takes no decisions, so that a loop over it becomes vector instructions.
+    #[inline(always)]
+    fn moderate(x: R, y: R, direct: bool) -> Self {
+        gauss(&GAUSS_6, x, y, R::of(0.0), R::of(1.0), direct, Self::NONE())
+    }
+
     /// A piece of optical depths `x` (τ_f l) and `y` (τ_b l), both finite and at least 0. Error at most 1e-6, and 1e-5 of α.
     #[inline(always)]
     pub fn new(x: R, y: R, direct: bool) -> Self {
         let (zero, one) = (R::of(0.0), R::of(1.0));
-        let none = Piece { alpha: zero, front: zero, back: zero };
         let steepest = x.max(y);
         if steepest <= R::of(SHALLOW) {
-            return gauss(&GAUSS_3, x, y, zero, one, direct, none);
+            return gauss(&GAUSS_3, x, y, zero, one, direct, Self::NONE());
         }
         if steepest <= R::of(PANEL) {
             return Piece::moderate(x, y, direct);
@@ -112,7 +103,7 @@ impl<R: Real> Piece<R> {
         let end = if x + y > deep { (deep / (x + (x * x + deep * (y - x)).max(zero).sqrt())).min(one) } else { one };
         let panels = (x.max(x + (y - x) * end) * end / R::of(PANEL)).truncate() + 1;
         let width = end / R::of(f64::from(panels));
-        let mut sum = none;
+        let mut sum = Self::NONE();
         for p in 0..panels {
             sum = gauss(&GAUSS_6, x, y, width * R::of(f64::from(p)), width, direct, sum);
         }
@@ -429,37 +420,48 @@ impl Batch {
         if std::arch::is_x86_feature_detected!("avx2") {
             #[target_feature(enable = "avx2")]
             fn wide(batch: &mut Batch, direct: bool, light: &mut Light<f32>) {
-                batch.integrate::<8>(direct, light);
+                batch.integrate(direct, light);
             }
-            #[allow(unsafe_code, reason = "the processor was just asked whether it has these instructions")]
-            // SAFETY: see the reason above; the function is safe otherwise.
+            #[allow(unsafe_code, reason = "vector instructions that the processor was just asked about")]
+            // SAFETY: the processor has AVX2.
             return unsafe { wide(self, direct, light) };
         }
-        self.integrate::<4>(direct, light);
+        self.integrate(direct, light);
     }
 
     #[inline(always)]
-    fn integrate<const L: usize>(&mut self, direct: bool, light: &mut Light<f32>) {
-        for start in (0..self.len).step_by(L) {
-            let lanes = |of: &[f32; BATCH]| Lanes::<L>(std::array::from_fn(|i| of[start + i]));
-            let length = lanes(&self.length);
-            let (x, y) = (lanes(&self.front[0]) * length, lanes(&self.back[0]) * length);
-            let mut piece = Piece::moderate(x, y, direct);
-            for i in 0..L.min(self.len - start) {
-                if x.0[i].max(y.0[i]) > PANEL as f32 {
-                    let deep = Piece::new(x.0[i], y.0[i], direct);
-                    (piece.alpha.0[i], piece.front.0[i], piece.back.0[i]) = (deep.alpha, deep.front, deep.back);
-                }
-            }
-            let emitted = [1, 2, 3].map(|k| {
-                let sum = lanes(&self.front[k]) * piece.front + lanes(&self.back[k]) * piece.back;
-                if direct { sum * length } else { sum }
-            });
-            for i in 0..L.min(self.len - start) {
-                light.add([0, 1, 2].map(|k| emitted[k].0[i]), piece.alpha.0[i]);
-            }
+    fn integrate(&mut self, direct: bool, light: &mut Light<f32>) {
+        let mut pieces = [[0.0; BATCH]; 3];
+        if direct {
+            self.moderate::<true>(&mut pieces);
+        } else {
+            self.moderate::<false>(&mut pieces);
+        }
+        for i in 0..self.len {
+            let length = self.length[i];
+            let (x, y) = (self.front[0][i] * length, self.back[0][i] * length);
+            let piece = if x.max(y) > PANEL as f32 {
+                Piece::new(x, y, direct)
+            } else {
+                Piece { alpha: pieces[0][i], front: pieces[1][i], back: pieces[2][i] }
+            };
+            let l = if direct { length } else { 1.0 };
+            light.add(
+                [1, 2, 3].map(|k| (self.front[k][i] * piece.front + self.back[k][i] * piece.back) * l),
+                piece.alpha,
+            );
         }
         self.len = 0;
+    }
+
+    /// [`Piece::moderate`] of the whole batch, in groups of eight.
+    #[inline(always)]
+    fn moderate<const DIRECT: bool>(&self, [alpha, front, back]: &mut [[f32; BATCH]; 3]) {
+        for i in 0..self.len.next_multiple_of(8) {
+            let (x, y) = (self.front[0][i] * self.length[i], self.back[0][i] * self.length[i]);
+            let piece = Piece::moderate(x, y, DIRECT);
+            (alpha[i], front[i], back[i]) = (piece.alpha, piece.front, piece.back);
+        }
     }
 }
 

@@ -3,16 +3,24 @@
 use std::fmt::Debug;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// What arithmetic without decisions needs: a number, or several [`Lanes`] of them.
-pub trait Arithmetic: Copy + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
+/// A floating-point number: f32, as the engines compute, or f64, as the tests judge them.
+pub trait Real:
+    Copy
+    + Debug
+    + PartialOrd
+    + Send
+    + Sync
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + 'static
+{
     /// The nearest number of this type; beyond its range, ±∞.
     fn of(x: f64) -> Self;
     /// eˣ for x ≤ 0.
     fn exp(self) -> Self;
-}
-
-/// A floating-point number: f32, as the engines compute, or f64, as the tests judge them.
-pub trait Real: Arithmetic + PartialOrd + Send + Sync + Div<Output = Self> + Neg<Output = Self> + 'static {
     /// √x.
     fn sqrt(self) -> Self;
     /// The integer part of x, for 0 ≤ x < 2³².
@@ -33,16 +41,13 @@ pub trait Real: Arithmetic + PartialOrd + Send + Sync + Div<Output = Self> + Neg
     }
 }
 
-impl Arithmetic for f64 {
+impl Real for f64 {
     fn of(x: f64) -> Self {
         x
     }
     fn exp(self) -> Self {
         f64::exp(self)
     }
-}
-
-impl Real for f64 {
     fn sqrt(self) -> Self {
         f64::sqrt(self)
     }
@@ -54,7 +59,7 @@ impl Real for f64 {
     }
 }
 
-impl Arithmetic for f32 {
+impl Real for f32 {
     #[inline(always)]
     fn of(x: f64) -> Self {
         x as f32
@@ -63,9 +68,6 @@ impl Arithmetic for f32 {
     fn exp(self) -> Self {
         exp(self)
     }
-}
-
-impl Real for f32 {
     #[inline(always)]
     fn sqrt(self) -> Self {
         f32::sqrt(self)
@@ -77,34 +79,6 @@ impl Real for f32 {
     #[inline(always)]
     fn is_finite(self) -> bool {
         f32::is_finite(self)
-    }
-}
-
-/// `L` numbers that are computed side by side: the compiler makes vector instructions of them.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Lanes<const L: usize>(pub [f32; L]);
-
-macro_rules! lane_by_lane {
-    ($($operator:ident $name:ident),*) => {$(
-        impl<const L: usize> $operator for Lanes<L> {
-            type Output = Self;
-            #[inline(always)]
-            fn $name(self, other: Self) -> Self {
-                Lanes(std::array::from_fn(|i| self.0[i].$name(other.0[i])))
-            }
-        }
-    )*};
-}
-lane_by_lane!(Add add, Sub sub, Mul mul);
-
-impl<const L: usize> Arithmetic for Lanes<L> {
-    #[inline(always)]
-    fn of(x: f64) -> Self {
-        Lanes([x as f32; L])
-    }
-    #[inline(always)]
-    fn exp(self) -> Self {
-        Lanes(std::array::from_fn(|i| exp(self.0[i])))
     }
 }
 
@@ -125,17 +99,17 @@ fn exp(x: f32) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use super::Arithmetic;
+    use super::Real;
 
     #[test]
     fn exp_is_accurate_to_its_last_place() {
         for i in 0..=870_000 {
             let x = -(i as f32) * 1e-4;
-            let (got, want) = (f64::from(Arithmetic::exp(x)), f64::from(x).exp());
+            let (got, want) = (f64::from(Real::exp(x)), f64::from(x).exp());
             assert!((got - want).abs() <= 1.8e-7 * want, "exp({x}) = {got}, not {want}");
         }
-        assert_eq!(Arithmetic::exp(-1e30f32), 0.0);
-        assert_eq!(Arithmetic::exp(f32::NEG_INFINITY), 0.0);
-        assert_eq!(Arithmetic::exp(0f32), 1.0);
+        assert_eq!(Real::exp(-1e30f32), 0.0);
+        assert_eq!(Real::exp(f32::NEG_INFINITY), 0.0);
+        assert_eq!(Real::exp(0f32), 1.0);
     }
 }
