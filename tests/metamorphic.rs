@@ -8,7 +8,7 @@ use glam::{DQuat, DVec3, dvec3};
 use halite::field::Association;
 use halite::mesh::{Array, Values};
 use halite::transfer::{Emission, TransferFunction};
-use halite::view::{ClippingPlane, Projection, View};
+use halite::view::{Blend, ClippingPlane, Projection, View};
 
 /// Two images of one scene, told in two ways.
 const BOUND: f64 = 1e-5;
@@ -184,7 +184,9 @@ fn moving_scene_and_camera_together_changes_nothing() {
 fn other_units_of_the_field_change_nothing() {
     let units = [("huge", 1e27, 0.0), ("tiny", 1e-30, 0.0), ("offset", 1.0, 1e7), ("falling", -2.5, 300.0)];
     let mut report = Report::default();
-    for (case, scene, views) in (0..rounds(1)).flat_map(scenes) {
+    for (case, scene, mut views) in (0..rounds(1)).flat_map(scenes) {
+        // The largest of falling values is another.
+        views.retain(|v| v.blend() == Blend::Composite);
         for (name, factor, offset) in units {
             let same = in_units(&scene, |s| factor * s + offset, factor < 0.0);
             hold(&mut report, &format!("{name}, {case}"), [(&scene, &views), (&same, &views)], BOUND);

@@ -8,10 +8,6 @@ mod common;
 use common::draw::{self, FIELDS, LOOKS, MESHES, Random, SIZE, VIEWS};
 use common::{ENGINES, Engine, Report, rounds};
 
-/// The engines sum some dozens of f32 segments, and see values and knots rounded to f32: in a steep function those move
-/// by 6e-8 of the range.
-const BOUND: f64 = 1e-5;
-
 /// Draws the mesh of this name with every look.
 fn judge(name: &str) {
     let m = MESHES.iter().position(|m| m.0 == name).expect("it is in the table");
@@ -26,7 +22,7 @@ fn judge(name: &str) {
             let view = view(&mut random);
             let expected = Engine::Reference.image(&scene, &view);
             for engine in ENGINES {
-                report.hold(&format!("{engine:?}, {case}"), &engine.image(&scene, &view), &expected, BOUND);
+                report.hold(&format!("{engine:?}, {case}"), &engine.image(&scene, &view), &expected, look.bound());
             }
         }
     }

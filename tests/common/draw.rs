@@ -115,7 +115,7 @@ impl Lot {
         for (place, jump) in places {
             for (k, wave) in waves.iter().enumerate() {
                 // In [0, 1], as the colours of RGBA are; what drives the opacity lies elsewhere.
-                let v = 0.5 + 0.5 * ((wave.dot(place) + k as f64).sin() + jump).clamp(-1.0, 1.0);
+                let v = 0.5 + 0.5 * ((wave.dot(place) + k as f64).sin() + jump) / 1.4;
                 let v = if k == self.components - 1 { 1000.0 + 40.0 * v } else { v };
                 values.push(match random.below(150) {
                     0..3 if self.missing => f64::NAN,
@@ -156,7 +156,10 @@ impl Shape {
                 let [s, h] = [at(4), at(8)];
                 (0..8).map(|i| (s[i / 2], h[(5 * i) % 8])).collect()
             }
-            Shape::Knots(n) => at(n).into_iter().map(|s| (s, random.within(0.0, 1.0))).collect(),
+            // Never close to one another: in a steep function any value that is rounded to f32 is wrong.
+            Shape::Knots(n) => {
+                (0..n).map(|i| ((i as f64 + random.within(0.25, 0.75)) / n as f64, random.within(0.0, 1.0))).collect()
+            }
             Shape::Wall => vec![(0.0, 0.0), (0.5, 0.4), (0.7, 1.0), (0.75, 1.3), (0.8, 0.2), (1.0, 0.1)],
         }
     }
@@ -201,6 +204,13 @@ pub(crate) const LOOKS: &[Look] = &[
 ];
 
 impl Look {
+    /// How far an engine that keeps values in f32 may be from the truth: some dozens of segments are summed, and knots are
+    /// rounded by 6e-8 of the range.
+    pub(crate) fn bound(&self) -> f64 {
+        // −ln(1 − a) is infinitely steep at 1: what a scalar is rounded by there is seen all along a cell.
+        if self.convention == Convention::Opacity && self.peak >= 1.0 { 5e-5 } else { 1e-5 }
+    }
+
     /// The function for `field`, in lengths where the mesh is about 2 wide.
     pub(crate) fn transfer(&self, field: &Field, random: &mut Random) -> TransferFunction {
         let over = |k: usize, share: f64| field.range(k)[0] + (field.range(k)[1] - field.range(k)[0]) * share;
