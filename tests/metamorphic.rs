@@ -1,5 +1,7 @@
 //! Changes of a scene that must not change its image.
 
+#![allow(clippy::expect_used, clippy::unwrap_used, reason = "a test fails by panicking")]
+
 mod common;
 
 use common::draw::{Random, camera, mesh_of, moved, scenes};

@@ -3,6 +3,8 @@
 //! Each test draws one mesh with every look in turn; views and fields pass by at other strides, so that all combinations
 //! come up in the end (HALITE_LONG=1). A wrong neighbour, order, entry, clip, unit or knot shows here.
 
+#![allow(clippy::expect_used, clippy::unwrap_used, reason = "a test fails by panicking")]
+
 mod common;
 
 use common::draw::{self, FIELDS, LOOKS, MESHES, Random, SIZE, VIEWS};
@@ -22,7 +24,12 @@ fn judge(name: &str) {
             let view = view(&mut random);
             let expected = Engine::Reference.image(&scene, &view);
             for engine in ENGINES {
-                report.hold(&format!("{engine:?}, {case}"), &engine.image(&scene, &view), &expected, look.bound());
+                report.hold(
+                    &format!("{engine:?}, {case}"),
+                    &engine.image(&scene, &view),
+                    &expected,
+                    look.bound(view.blend()),
+                );
             }
         }
     }

@@ -206,9 +206,12 @@ pub(crate) const LOOKS: &[Look] = &[
 impl Look {
     /// How far an engine that keeps values in f32 may be from the truth: some dozens of segments are summed, and knots are
     /// rounded by 6e-8 of the range.
-    pub(crate) fn bound(&self) -> f64 {
+    pub(crate) fn bound(&self, blend: Blend) -> f64 {
         // −ln(1 − a) is infinitely steep at 1: what a scalar is rounded by there is seen all along a cell.
-        if self.convention == Convention::Opacity && self.peak >= 1.0 { 5e-5 } else { 1e-5 }
+        let logarithm = self.convention == Convention::Opacity && self.peak >= 1.0;
+        // One value makes the pixel, and a peak rises by 750 for each half of the range.
+        let slope = blend == Blend::Maximum && matches!(self.shape, Shape::Peak);
+        if logarithm || slope { 5e-5 } else { 1e-5 }
     }
 
     /// The function for `field`, in lengths where the mesh is about 2 wide.
