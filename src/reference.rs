@@ -296,7 +296,8 @@ impl Light {
         let [a0, a1] = [piece.ends[0][3], piece.ends[1][3]];
         let per_unit = piece.length / transfer.unit_distance();
         let logarithmic = transfer.convention() == Convention::Opacity;
-        if logarithmic && (a0.min(a1) >= 1.0 || (a0 == a1 && a0 >= OPAQUE)) {
+        // Pieces end where the opacity passes 1, so its mean tells on which side they are; their ends are off by rounding.
+        if logarithmic && (a0 + a1 >= 2.0 || (a0 == a1 && a0 >= OPAQUE)) {
             for k in 0..3 {
                 self.color[k] += if direct { 0.0 } else { self.transmittance * piece.ends[0][k] };
             }

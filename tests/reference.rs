@@ -149,6 +149,13 @@ fn opacity_one_ends_the_ray() {
     // In white, all that is emitted before the wall and at it adds up to 1.
     let slope = transfer(WHITE, &[(0.0, 0.0), (1.0, 2.0)], 0.5).with_convention(Convention::Opacity);
     near(through_ramp(&slope, along_z(0.3, 0.4)), [1.0, 1.0]);
+    // A stretch at 1 and above is a wall also where rounding puts its end a little below 1.
+    for i in 0..50 {
+        let s = 0.3 + f64::from(i) * 1e-3;
+        let knots = [(0.0, 0.2), (s, 1.0), (s + 0.1, 1.3), (1.0, 0.0)];
+        let wall = transfer(WHITE, &knots, 0.5).with_convention(Convention::Opacity);
+        near(through_ramp(&wall, along_z(0.3, 0.4)), [1.0, 1.0]);
+    }
     let direct = wall.with_emission(Emission::Direct { scale: 2.0 }).unwrap();
     near(through_ramp(&direct, along_z(0.3, 0.4)), [2.0 * 0.25 * 0.25 / 2.0, 1.0]);
 }

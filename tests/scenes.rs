@@ -1,0 +1,119 @@
+//! The scenes of `../shared/reference`, whose images another program drew in f64: where that folder is not, the meshes
+//! of the other tests stand alone.
+
+#![allow(
+    clippy::expect_used,
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stderr,
+    reason = "a test fails by panicking"
+)]
+
+mod common;
+
+use common::{ENGINES, Report, Scene};
+use halite::Error;
+use halite::image::Image;
+use halite::mesh::cells::Tetrahedra;
+use halite::reference::Reference;
+use halite::scene;
+use halite::view::View;
+use std::path::{Path, PathBuf};
+
+/// What the engines must reach is 5e-4; the twin is better than this.
+const BOUND: f64 = 2e-5;
+
+/// Scenes of work that is not done: curved cells as they are, bivariate widgets, structured grids.
+const LATER: [&str; 3] = ["curved_", "bivariate_", "regular_"];
+
+/// Scenes whose cells cannot be drawn yet, and what the error must name.
+const UNSUPPORTED: [(&str, &str); 2] = [("linear_quadratic", "quadratic"), ("linear_polyhedra", "polyhedr")];
+
+/// Scenes of few cells, in which the judge is judged: each a different feature.
+const JUDGED: [&str; 9] = [
+    "coarse_bands",
+    "discontinuous",
+    "holes",
+    "huge_neighbour",
+    "layers_wall",
+    "linear_hexes",
+    "linear_pyramids",
+    "linear_wedges",
+    "opacity_one",
+];
+
+/// The scene files that `check.py` draws too; none if the folder is not there.
+fn files() -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/reference");
+    let Ok(entries) = std::fs::read_dir(&folder) else {
+        eprintln!("skipped: there is no {}", folder.display());
+        return vec![];
+    };
+    let mut files: Vec<PathBuf> = entries.map(|e| e.expect("a folder that can be read").path()).collect();
+    files.retain(|f| f.extension().is_some_and(|e| e == "json") && !LATER.iter().any(|l| stem(f).starts_with(l)));
+    files.sort();
+    assert!(files.len() >= 20, "{} has {} scenes only", folder.display(), files.len());
+    files
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// What `file` says to draw; an error if its cells cannot be.
+fn open(file: &Path) -> halite::Result<(Scene, View)> {
+    let scene = scene::Scene::open(file)?;
+    let mesh = halite::io::open(&scene.mesh, &|_| ())?;
+    let (field, (view, _)) = (scene.scalars.field(&mesh)?, scene.view()?);
+    Ok((Scene { tetrahedra: Tetrahedra::new(&mesh)?, mesh, field, transfer: scene.transfer }, view))
+}
+
+/// Anything that the generated scenes do not have: files, real meshes, another author's idea of the conventions.
+#[test]
+fn the_engines_draw_what_the_oracle_drew() {
+    let mut report = Report::default();
+    for file in files() {
+        let name = stem(&file);
+        let (scene, view) = match open(&file) {
+            Ok(scene) => scene,
+            Err(error) => {
+                let what = UNSUPPORTED.iter().find(|u| u.0 == name).unwrap_or_else(|| panic!("{name}: {error}")).1;
+                assert!(matches!(error, Error::Mesh(_)) && error.to_string().to_lowercase().contains(what), "{error}");
+                continue;
+            }
+        };
+        let truth = Image::open(&file.with_extension("npy")).expect("the truth beside the scene");
+        for engine in ENGINES {
+            report.hold(&format!("{engine:?}, {name}"), &engine.image(&scene, &view), &truth, BOUND);
+        }
+    }
+    if !files().is_empty() {
+        report.finish("scenes");
+    }
+}
+
+/// A judge that shares the engines' errors would let them pass.
+#[test]
+fn the_judge_agrees_with_the_oracle() {
+    let mut report = Report::default();
+    for file in files() {
+        let name = stem(&file);
+        if !JUDGED.contains(&name.as_str()) {
+            continue;
+        }
+        let (scene, view) = open(&file).expect("a scene that can be drawn");
+        let truth = Image::open(&file.with_extension("npy")).expect("the truth beside the scene");
+        let judge = Reference::new(&scene.mesh, &scene.tetrahedra, &scene.field, &scene.transfer).expect("a scene");
+        let w = view.size()[0];
+        // 17 is no multiple of any width: all columns come up.
+        for (i, expected) in truth.pixels.iter().enumerate().step_by(17) {
+            let at = [i as u32 % w, i as u32 / w];
+            let got = judge.ray(&view.ray(at[0], at[1]), view.blend());
+            let error = got.iter().zip(expected).map(|(a, b)| (a - f64::from(*b)).abs()).fold(0.0, f64::max);
+            report.measure(&name, error, 1e-6, || format!("pixel {at:?} is {got:?}, not {expected:?}"));
+        }
+    }
+    if !files().is_empty() {
+        report.finish("judge");
+    }
+}

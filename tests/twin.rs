@@ -1,0 +1,76 @@
+//! The engines against the judge: every generated mesh with every kind of transfer function, field and view.
+//!
+//! Each test draws one mesh with every look in turn; views and fields pass by at other strides, so that all combinations
+//! come up in the end (HALITE_LONG=1). A wrong neighbour, order, entry, clip, unit or knot shows here.
+
+#![allow(clippy::expect_used, clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod common;
+
+use common::draw::{self, FIELDS, LOOKS, MESHES, Random, SIZE, VIEWS};
+use common::{ENGINES, Engine, Report, rounds};
+
+/// Draws the mesh of this name with every look.
+fn judge(name: &str) {
+    let m = MESHES.iter().position(|m| m.0 == name).expect("it is in the table");
+    let mut report = Report::default();
+    for round in 0..rounds(2) {
+        for (l, look) in LOOKS.iter().enumerate() {
+            let lot = &FIELDS[(m + l + 3 * round) % FIELDS.len()];
+            let (view_name, view) = VIEWS[(5 * m + l + 7 * round) % VIEWS.len()];
+            let case = format!("{name}, {}, {}, {view_name}, {round}", look.name, lot.name);
+            let mut random = Random::of(&case);
+            let scene = draw::scene(&MESHES[m].1(), lot, look, &mut random);
+            let view = view(&mut random);
+            let expected = Engine::Reference.image(&scene, &view);
+            for engine in ENGINES {
+                report.hold(
+                    &format!("{engine:?}, {case}"),
+                    &engine.image(&scene, &view),
+                    &expected,
+                    look.bound(view.blend()),
+                );
+            }
+        }
+    }
+    report.finish(name);
+}
+
+macro_rules! meshes {
+    ($($test:ident: $name:literal,)*) => {
+        $(#[test] fn $test() { judge($name); })*
+
+        #[test]
+        fn every_mesh_is_judged() {
+            assert_eq!(MESHES.iter().map(|m| m.0).collect::<Vec<_>>(), [$($name),*]);
+        }
+    };
+}
+
+meshes! {
+    tetrahedra: "tetrahedra",
+    hexahedra: "hexahedra",
+    wedges: "wedges",
+    pyramids: "pyramids",
+    mixed: "mixed",
+    islands: "islands",
+    unwelded: "unwelded",
+    t_junction: "t-junction",
+    ring: "ring",
+    demo: "demo",
+}
+
+/// A test of images of nothing would pass: most scenes show something.
+#[test]
+fn the_scenes_are_worth_drawing() {
+    let mut seen = 0;
+    for (name, view) in VIEWS {
+        let mut random = Random::of(name);
+        let scene = draw::scene(&MESHES[0].1(), &FIELDS[0], &LOOKS[0], &mut random);
+        let image = Engine::Reference.image(&scene, &view(&mut random));
+        let covered = image.pixels.iter().filter(|p| p[3] > 0.01).count();
+        assert!(covered > image.pixels.len() / 20, "{name}: {covered} pixels");
+        seen += covered;
+    }
+    assert!(seen > VIEWS.len() * (SIZE[0] * SIZE[1]) as usize / 3, "{seen} pixels");
+}
