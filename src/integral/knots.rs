@@ -1,0 +1,262 @@
+//! The transfer function as the kernel reads it: knots over the normalised scalar.
+
+use super::OPAQUE_EXTINCTION;
+use crate::field::Normal;
+use crate::real::Real;
+use crate::transfer::{Convention, OPAQUE, TransferFunction};
+
+/// A piecewise linear function of the normalised scalar with four channels: extinction per normalised unit of length,
+/// and red, green, blue of the colour (or, for direct emission, of the emission per normalised unit of length).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Knots<R> {
+    /// Ascending; the first and the last lie beyond every scalar.
+    pub(crate) s: Vec<R>,
+    /// Value at each knot; at a step, two knots share their s.
+    pub(crate) value: Vec<[R; 4]>,
+    /// Slope of each interval; 0 for intervals of no width.
+    pub(crate) slope: Vec<[R; 4]>,
+    /// For each of [`BUCKETS`] equal parts of [−1, 1], the interval that its lower end lies in.
+    pub(crate) bucket: Vec<u32>,
+}
+
+/// Number of entries of the look-up that finds the interval of a scalar.
+pub(crate) const BUCKETS: usize = 512;
+
+/// Beyond every normalised scalar.
+const FAR: f64 = 1e30;
+
+impl<R: Real> Knots<R> {
+    /// The function through `knots` `(s, value)`, ascending; constant outside them.
+    fn new(mut knots: Vec<(f64, [f64; 4])>) -> Self {
+        let (first, last) = (knots.first().map_or([0.0; 4], |k| k.1), knots.last().map_or([0.0; 4], |k| k.1));
+        knots.insert(0, (-FAR, first));
+        knots.push((FAR, last));
+        let s: Vec<R> = knots.iter().map(|k| R::of(k.0.clamp(-FAR, FAR))).collect();
+        let value: Vec<[R; 4]> = knots.iter().map(|k| k.1.map(R::of)).collect();
+        let slope = (0..knots.len())
+            .map(|i| match knots.get(i + 1) {
+                Some(next) if s[i] < s[i + 1] => {
+                    [0, 1, 2, 3].map(|k| R::of((next.1[k] - knots[i].1[k]) / (next.0 - knots[i].0)))
+                }
+                _ => [R::of(0.0); 4],
+            })
+            .collect();
+        let bucket = (0..BUCKETS)
+            .map(|b| {
+                let low = R::of(2.0 * b as f64 / BUCKETS as f64 - 1.0);
+                (s.partition_point(|&k| k <= low).max(1) - 1) as u32
+            })
+            .collect();
+        Knots { s, value, slope, bucket }
+    }
+
+    /// Number of knots, those beyond every scalar included.
+    pub fn len(&self) -> usize {
+        self.s.len()
+    }
+
+    /// Never true: there are at least the two outer knots.
+    pub fn is_empty(&self) -> bool {
+        self.s.is_empty()
+    }
+
+    /// The interval that `s` lies in: the last whose lower end is not above it.
+    #[inline(always)]
+    fn interval(&self, s: R) -> usize {
+        let scaled = (s + R::of(1.0)) * R::of(BUCKETS as f64 / 2.0);
+        let b = scaled.max(R::of(0.0)).min(R::of((BUCKETS - 1) as f64));
+        let mut i = self.bucket[b.truncate() as usize] as usize;
+        while i > 0 && self.s[i] > s {
+            i -= 1;
+        }
+        while i + 2 < self.s.len() && self.s[i + 1] <= s {
+            i += 1;
+        }
+        i
+    }
+}
+
+/// One linear value along a segment, and the interval of its function that it is in.
+pub(super) struct Track<'a, R> {
+    knots: &'a Knots<R>,
+    i: usize,
+    front: R,
+    rise: R,
+}
+
+impl<'a, R: Real> Track<'a, R> {
+    #[inline(always)]
+    pub(super) fn new(knots: &'a Knots<R>, front: R, back: R) -> Self {
+        let (mut i, rise) = (knots.interval(front), back - front);
+        if rise == R::of(0.0) {
+            // A constant that is opaque as a single value is opaque all along.
+            let opaque = |k: &[R; 4]| k[0] >= R::of(OPAQUE_EXTINCTION);
+            while i > 0 && knots.s[i - 1] == front && opaque(&knots.value[i - 1]) && !opaque(&knots.value[i]) {
+                i -= 1;
+            }
+        }
+        Track { knots, i, front, rise }
+    }
+
+    /// Where in [0, 1] the value leaves the interval; above 1 if it does not.
+    #[inline(always)]
+    pub(super) fn end(&self) -> R {
+        let zero = R::of(0.0);
+        if self.rise > zero {
+            (self.knots.s[self.i + 1] - self.front) / self.rise
+        } else if self.rise < zero {
+            (self.knots.s[self.i] - self.front) / self.rise
+        } else {
+            R::of(2.0)
+        }
+    }
+
+    /// The function's value at `u`, by the line of the interval.
+    #[inline(always)]
+    pub(super) fn at(&self, u: R) -> [R; 4] {
+        let (low, high) = (self.knots.s[self.i], self.knots.s[self.i + 1]);
+        let offset = (self.front + self.rise * u).max(low).min(high) - low;
+        let (value, slope) = (&self.knots.value[self.i], &self.knots.slope[self.i]);
+        [0, 1, 2, 3].map(|k| value[k] + slope[k] * offset)
+    }
+
+    /// Steps to the next interval; false if there is none.
+    #[inline(always)]
+    pub(super) fn advance(&mut self) -> bool {
+        if self.rise > R::of(0.0) {
+            self.i += 1;
+            self.i + 1 < self.knots.s.len()
+        } else {
+            self.i = self.i.wrapping_sub(1);
+            self.i != usize::MAX
+        }
+    }
+}
+
+/// Which of its values a function has at a step.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Side {
+    Below,
+    Above,
+    /// The greatest of all knots there, in the first channel.
+    Densest,
+}
+
+/// The limit of the piecewise linear function through `knots` at `s`; outside them the end value, or 0 without `clamp`.
+pub(super) fn sample<const N: usize>(knots: &[(f64, [f64; N])], clamp: bool, s: f64, side: Side) -> [f64; N] {
+    let (below, above) = (knots.partition_point(|k| k.0 < s), knots.partition_point(|k| k.0 <= s));
+    let above = match side {
+        Side::Below => below,
+        Side::Above => above,
+        Side::Densest => match knots[below..above].iter().max_by(|a, b| a.1[0].total_cmp(&b.1[0])) {
+            Some(k) => return k.1,
+            None => above,
+        },
+    };
+    match (above, knots) {
+        (_, []) => [0.0; N],
+        (0, [first, ..]) => first.1.map(|v| if clamp { v } else { 0.0 }),
+        (i, [.., last]) if i == knots.len() => last.1.map(|v| if clamp { v } else { 0.0 }),
+        (i, _) => {
+            let ((s0, a), (s1, b)) = (knots[i - 1], knots[i]);
+            let w = (s - s0) / (s1 - s0);
+            std::array::from_fn(|k| a[k] + (b[k] - a[k]) * w)
+        }
+    }
+}
+
+/// The knots of `value` over the normalised scalar, at `places` in the field's own units; both limits at each.
+pub(super) fn compile<R: Real>(
+    mut places: Vec<f64>,
+    normal: Normal,
+    value: impl Fn(f64, Side) -> [f64; 4],
+) -> Knots<R> {
+    places.sort_by(f64::total_cmp);
+    places.dedup();
+    let mut knots = Vec::with_capacity(2 * places.len());
+    for s in places {
+        let (x, below, above) = (normal.apply(s), value(s, Side::Below), value(s, Side::Above));
+        let densest = value(s, Side::Densest);
+        knots.push((x, below));
+        if densest[0] > below[0].max(above[0]) {
+            knots.push((x, densest));
+        }
+        if above != below || densest[0] > below[0] {
+            knots.push((x, above));
+        }
+    }
+    Knots::new(knots)
+}
+
+/// Extinction per world unit of length as a piecewise linear function of the field, by the transfer function's convention;
+/// `opaque` on every stretch where opacity is 1 or more. A value that reaches 1 alone lets light through: the logarithm's
+/// integral is finite there.
+pub(super) fn extinction(transfer: &TransferFunction, opaque: f64) -> Vec<(f64, [f64; 1])> {
+    let knots = transfer.opacity();
+    if transfer.convention() == Convention::Extinction {
+        return knots.iter().map(|&(s, a)| (s, [transfer.extinction(a).min(opaque)])).collect();
+    }
+    // On its way to 1: what lies beyond `OPAQUE` has no length that f32 could tell.
+    let tau = |a: f64| [-(-a.min(OPAQUE)).ln_1p() / transfer.unit_distance()];
+    let mut curve = vec![];
+    for w in knots.windows(2) {
+        let [(s0, a0), (s1, a1)] = [w[0], w[1]];
+        let (low, high) = (a0.min(a1), a0.max(a1));
+        let place = |a: f64| s0 + (s1 - s0) * ((a - a0) / (a1 - a0));
+        if low >= OPAQUE {
+            curve.extend([(s0, [opaque]), (s1, [opaque])]);
+            continue;
+        }
+        if a0 >= OPAQUE {
+            curve.push((s0, [opaque]));
+        }
+        let mut rise: Vec<_> = std::iter::successors(Some(low), |&a| Some(a + chord(a)))
+            .take_while(|&a| a < high.min(OPAQUE))
+            .chain([high.min(OPAQUE)])
+            .map(|a| (place(a), tau(a)))
+            .collect();
+        if high > 1.0 {
+            rise.extend([(place(1.0), tau(1.0)), (place(1.0), [opaque]), (place(high), [opaque])]);
+        } else {
+            rise.push((place(high), tau(high)));
+        }
+        if a1 < a0 {
+            rise.reverse();
+        }
+        match s0 < s1 && a0 != a1 {
+            true => curve.extend(rise),
+            false => curve.extend([(s0, tau(a0)), (s1, tau(a1))]),
+        }
+    }
+    // Beyond the outer knots their values hold: there an opaque one is a stretch.
+    for (k, end) in [knots.first(), knots.last()].into_iter().enumerate() {
+        if let Some(&(s, a)) = end {
+            let value = if a >= OPAQUE { [opaque] } else { tau(a) };
+            curve.insert(if k == 0 { 0 } else { curve.len() }, (s, value));
+        }
+    }
+    curve
+}
+
+/// How far opacity may rise from `a` before the chord of −ln(1 − a) is off by 1e-5 of it.
+fn chord(a: f64) -> f64 {
+    (0.9 * (8e-5 * -(-a).ln_1p()).sqrt() * (1.0 - a)).max(1.8e-5 * (1.0 - a))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn opacity_convention_stays_near_its_logarithm() {
+        let color = vec![(0.0, [1.0; 3])];
+        let opacity = vec![(-1.0, 0.0), (0.0, 0.7), (0.5, 0.2), (0.9, 0.999)];
+        let transfer = TransferFunction::new(color, opacity, 0.3).unwrap().with_convention(Convention::Opacity);
+        let curve = extinction(&transfer, 1e15);
+        for i in 0..100_000 {
+            let s = -1.0 + 1.9 * (f64::from(i) + 0.37) / 1e5;
+            let (got, want) = (sample(&curve, true, s, Side::Above)[0], transfer.extinction(transfer.opacity_at(s)));
+            assert!((got - want).abs() <= 1.01e-5 * want, "{s}: {got}, not {want}");
+        }
+    }
+}
