@@ -16,8 +16,8 @@ use halite::transfer::{Convention, Emission, TransferFunction};
 use halite::view::{Blend, Camera, Projection, View};
 
 /// Of any channel of any pixel, and over all of them.
-const MAX: f64 = 5e-4;
-const RMSE: f64 = 5e-5;
+const MAX: f64 = 2e-5;
+const RMSE: f64 = 2e-6;
 
 /// Maximum and root mean square of the differences between the engine's picture and the reference's.
 fn errors(mesh: &Mesh, of: Association, transfer: &TransferFunction, projection: Projection, blend: Blend) -> [f64; 2] {
