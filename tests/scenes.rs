@@ -11,7 +11,7 @@
 
 mod common;
 
-use common::{ENGINES, Report, Scene};
+use common::{ENGINES, Report, Scene, rounds};
 use halite::Error;
 use halite::image::Image;
 use halite::mesh::cells::Tetrahedra;
@@ -105,8 +105,8 @@ fn the_judge_agrees_with_the_oracle() {
         let truth = Image::open(&file.with_extension("npy")).expect("the truth beside the scene");
         let judge = Reference::new(&scene.mesh, &scene.tetrahedra, &scene.field, &scene.transfer).expect("a scene");
         let w = view.size()[0];
-        // 17 is no multiple of any width: all columns come up.
-        for (i, expected) in truth.pixels.iter().enumerate().step_by(17) {
+        // Primes divide no width: all columns come up.
+        for (i, expected) in truth.pixels.iter().enumerate().step_by(if rounds(1) > 1 { 17 } else { 67 }) {
             let at = [i as u32 % w, i as u32 / w];
             let got = judge.ray(&view.ray(at[0], at[1]), view.blend());
             let error = got.iter().zip(expected).map(|(a, b)| (a - f64::from(*b)).abs()).fold(0.0, f64::max);
