@@ -10,13 +10,13 @@ const BATCH: usize = 32;
 pub struct Batch {
     len: usize,
     length: [f32; BATCH],
-    front: [[f32; BATCH]; 4],
-    back: [[f32; BATCH]; 4],
+    front: [[f32; 4]; BATCH],
+    back: [[f32; 4]; BATCH],
 }
 
 impl Default for Batch {
     fn default() -> Self {
-        Batch { len: 0, length: [0.0; BATCH], front: [[0.0; BATCH]; 4], back: [[0.0; BATCH]; 4] }
+        Batch { len: 0, length: [0.0; BATCH], front: [[0.0; 4]; BATCH], back: [[0.0; 4]; BATCH] }
     }
 }
 
@@ -41,10 +41,7 @@ impl Batch {
                 self.flush(exact.direct, light);
             }
             self.length[self.len] = share * length;
-            for k in 0..4 {
-                self.front[k][self.len] = f[k];
-                self.back[k][self.len] = b[k];
-            }
+            (self.front[self.len], self.back[self.len]) = (f, b);
             self.len += 1;
         });
     }
@@ -66,37 +63,33 @@ impl Batch {
 
     #[inline(always)]
     fn integrate(&mut self, direct: bool, light: &mut Light<f32>) {
-        let mut pieces = [[0.0; BATCH]; 3];
-        if direct {
-            self.moderate::<true>(&mut pieces);
-        } else {
-            self.moderate::<false>(&mut pieces);
+        let (mut x, mut y) = ([0.0; BATCH], [0.0; BATCH]);
+        let pieces = self.front.iter().zip(&self.back).zip(&self.length).take(self.len);
+        for (((front, back), length), (x, y)) in pieces.clone().zip(x.iter_mut().zip(&mut y)) {
+            (*x, *y) = (front[0] * length, back[0] * length);
         }
-        #[expect(clippy::needless_range_loop, reason = "i runs over seven arrays at once")]
-        for i in 0..self.len {
-            let length = self.length[i];
-            let (x, y) = (self.front[0][i] * length, self.back[0][i] * length);
-            let piece = if x.max(y) > PANEL as f32 {
-                Piece::new(x, y, direct)
+        let moderate = if direct { moderate::<true>(&x, &y, self.len) } else { moderate::<false>(&x, &y, self.len) };
+        for (i, ((f, b), length)) in pieces.enumerate() {
+            let piece = if x[i].max(y[i]) > PANEL as f32 {
+                Piece::new(x[i], y[i], direct)
             } else {
-                Piece { alpha: pieces[0][i], front: pieces[1][i], back: pieces[2][i] }
+                Piece { alpha: moderate[0][i], front: moderate[1][i], back: moderate[2][i] }
             };
-            let l = if direct { length } else { 1.0 };
-            light.add(
-                [1, 2, 3].map(|k| (self.front[k][i] * piece.front + self.back[k][i] * piece.back) * l),
-                piece.alpha,
-            );
+            let l = if direct { *length } else { 1.0 };
+            light.add([1, 2, 3].map(|k| (f[k] * piece.front + b[k] * piece.back) * l), piece.alpha);
         }
         self.len = 0;
     }
+}
 
-    /// [`Piece::moderate`] of the whole batch, in groups of eight.
-    #[inline(always)]
-    fn moderate<const DIRECT: bool>(&self, [alpha, front, back]: &mut [[f32; BATCH]; 3]) {
-        for i in 0..self.len.next_multiple_of(8) {
-            let (x, y) = (self.front[0][i] * self.length[i], self.back[0][i] * self.length[i]);
-            let piece = Piece::moderate(x, y, DIRECT);
-            (alpha[i], front[i], back[i]) = (piece.alpha, piece.front, piece.back);
-        }
+/// α, front and back of [`Piece::moderate`] for the first `len` depths, and some more.
+#[inline(always)]
+fn moderate<const DIRECT: bool>(x: &[f32; BATCH], y: &[f32; BATCH], len: usize) -> [[f32; BATCH]; 3] {
+    let [mut alpha, mut front, mut back] = [[0.0; BATCH]; 3];
+    // Whole vectors, and never beyond the arrays, which is what the compiler must see.
+    for i in 0..len.next_multiple_of(8).min(BATCH) {
+        let piece = Piece::moderate(x[i], y[i], DIRECT);
+        (alpha[i], front[i], back[i]) = (piece.alpha, piece.front, piece.back);
     }
+    [alpha, front, back]
 }

@@ -16,7 +16,8 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 /// Width and height of the square of pixels whose rays share their search for entries.
 const TILE: u32 = 8;
 
-/// Transmittance below which a ray ends: what lies behind adds less than this to any channel.
+/// Transmittance below which a ray ends: what lies behind adds less than this times its colour to any channel. (Direct emission
+/// has no such bound.)
 pub const NEGLIGIBLE: f32 = 1e-6;
 
 /// A ray that passes a boundary face this close to its edge (as a barycentric weight) is traced again beside it: where
@@ -197,7 +198,7 @@ impl<'a, const N: usize> Tracer<'a, N> {
             return false;
         }
         for e in 0..self.entries.len() {
-            if self.entries[e].t >= t_max || gathered.light.through < NEGLIGIBLE {
+            if self.entries[e].t >= t_max || self.is_over(gathered) {
                 break;
             }
             let exit = self.follow(frame, e, [t_min, t_max], gathered);
@@ -269,7 +270,7 @@ impl<'a, const N: usize> Tracer<'a, N> {
                     self.gather(at(from), at(to), to - from, gathered);
                 }
                 reached = left;
-                if reached >= t_max || gathered.light.through < NEGLIGIBLE {
+                if reached >= t_max || self.is_over(gathered) {
                     return None;
                 }
             }
@@ -280,6 +281,12 @@ impl<'a, const N: usize> Tracer<'a, N> {
                 return Some(weights);
             }
         }
+    }
+
+    /// Whether nothing behind can be seen.
+    #[inline(always)]
+    fn is_over(&self, gathered: &Gathered<N>) -> bool {
+        gathered.light.through < if self.exact.direct { f32::MIN_POSITIVE } else { NEGLIGIBLE }
     }
 
     #[inline(always)]
