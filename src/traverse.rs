@@ -1,10 +1,12 @@
 //! The traverse engine: each pixel's ray walks from cell to neighbouring cell through shared faces.
 //!
 //! A ray enters a connected part of the mesh through each boundary face that it meets from outside, and walks until it
-//! leaves. [`Geometry`] is what the walk needs of a mesh, [`boundary`] finds the entries, [`cpu`] walks.
+//! leaves. [`Geometry`] is what the walk needs of a mesh, [`boundary`] finds the entries, [`cpu`] walks; `gpu` does
+//! both on a GPU.
 
 pub mod boundary;
 pub mod cpu;
+pub(crate) mod gpu;
 
 use crate::error::{Error, Result};
 use crate::field::{Association, Field};

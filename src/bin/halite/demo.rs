@@ -2,6 +2,7 @@ use crate::{choose, output, render};
 use anyhow::Result;
 use clap::Args;
 use halite::mesh::{cells::Tetrahedra, generate};
+use halite::render::Renderer;
 use halite::scene::Scalars;
 use std::path::PathBuf;
 
@@ -24,7 +25,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     let field = scalars.field(&mesh)?;
     let scene = choose::scene(&mesh, &tetrahedra, scalars, &field, Default::default())?;
     let (view, _) = scene.view()?;
-    let drawn = render::draw(&mesh, tetrahedra, &field, &scene.transfer, &view, threads)?;
+    let drawn = render::draw(Renderer::new(threads)?, &mesh, tetrahedra, &field, &scene.transfer, &view)?;
     drawn.image.save(&options.out, render::backdrop(scene.background, None))?;
     output::print(&format!("{}\n", options.out.display()))
 }

@@ -2,6 +2,7 @@ use crate::{camera, choose, output, parse, progress};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use halite::field::{Association, Component, Field};
+use halite::gpu::DeviceChoice;
 use halite::image::{Backdrop, Image};
 use halite::mesh::{Mesh, cells, cells::Tetrahedra};
 use halite::render::{Renderer, Stats};
@@ -69,9 +70,9 @@ pub(crate) struct Options {
     /// How rays find their cells
     #[arg(long, help_heading = "Engine")]
     engine: Option<Engine>,
-    /// Where the work is done; HALITE_DEVICE overrides it
-    #[arg(long, help_heading = "Engine")]
-    device: Option<Device>,
+    /// Where the work is done: auto, cpu, or a device's index, UUID or part of its name; HALITE_DEVICE overrides auto
+    #[arg(long, value_name = "DEVICE", help_heading = "Engine")]
+    device: Option<String>,
     /// How a ray is integrated in a cell
     #[arg(long, help_heading = "Engine")]
     integral: Option<Integral>,
@@ -97,12 +98,6 @@ enum Engine {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum Device {
-    Auto,
-    Cpu,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
 enum Integral {
     Exact,
 }
@@ -115,7 +110,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     let map = options.colormap.as_deref().map(color_map).transpose()?;
     let from_file = options.input.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
     let given = if from_file { Some(Scene::open(&options.input)?) } else { None };
-    check_device(given.as_ref()).with_context(|| options.input.display().to_string())?;
+    check_engine(given.as_ref()).with_context(|| options.input.display().to_string())?;
 
     let start = Instant::now();
     let path = given.as_ref().map_or(&options.input, |scene| &scene.mesh);
@@ -153,7 +148,14 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     };
     let (view, behind) = scene.view()?;
 
-    let drawn = draw(&mesh, tetrahedra, &field, &scene.transfer, &view, threads)?;
+    let device = match (&options.device, &scene.device) {
+        (Some(name), _) => name.clone(),
+        (None, Some(serde_json::Value::String(name))) => name.clone(),
+        (None, Some(index)) => index.to_string(),
+        (None, None) => "auto".into(),
+    };
+    let renderer = Renderer::with_device(threads, DeviceChoice::parse(&device))?;
+    let drawn = draw(renderer, &mesh, tetrahedra, &field, &scene.transfer, &view)?;
     drawn.image.save(&options.out, backdrop(scene.background, behind.as_deref()))?;
     if let Some(path) = &options.stats {
         let json = drawn.report(view.size(), load_ms, split_ms);
@@ -221,8 +223,8 @@ fn color_map(text: &str) -> Result<ColorMap> {
     Ok(if file.ends_with(".json") { ColorMap::open(Path::new(&file), preset)? } else { ColorMap::named(text)? })
 }
 
-/// Refuses what a scene, or the environment, asks for and Halite has not: what options ask for, clap has checked.
-fn check_device(scene: Option<&Scene>) -> Result<()> {
+/// Refuses what a scene asks for and Halite has not: what options ask for, clap has checked.
+fn check_engine(scene: Option<&Scene>) -> Result<()> {
     fn check<T: ValueEnum>(what: &str, name: &str) -> Result<()> {
         if T::from_str(name, true).is_err() {
             let known = T::value_variants().iter().filter_map(ValueEnum::to_possible_value);
@@ -231,17 +233,11 @@ fn check_device(scene: Option<&Scene>) -> Result<()> {
         }
         Ok(())
     }
-    if let Ok(name) = std::env::var("HALITE_DEVICE") {
-        check::<Device>("HALITE_DEVICE", &name)?;
-    }
     let Some(scene) = scene else { return Ok(()) };
     if let Some(name) = &scene.engine {
         check::<Engine>("engine", name)?;
     }
     let text = |v: &serde_json::Value| v.as_str().map_or_else(|| v.to_string(), str::to_owned);
-    if let Some(device) = &scene.device {
-        check::<Device>("device", &text(device))?;
-    }
     if let Some(integral) = &scene.integral {
         check::<Integral>("integral", &text(integral))?;
     }
@@ -271,14 +267,13 @@ pub(crate) struct Drawn {
 }
 
 pub(crate) fn draw(
+    mut renderer: Renderer,
     mesh: &Mesh,
     tetrahedra: Tetrahedra,
     field: &Field,
     transfer: &TransferFunction,
     view: &View,
-    threads: usize,
 ) -> Result<Drawn> {
-    let mut renderer = Renderer::new(threads)?;
     renderer.set_mesh(mesh, tetrahedra);
     renderer.set_field(field)?;
     renderer.set_transfer(transfer);
@@ -296,7 +291,7 @@ impl Drawn {
             "load_ms": load_ms, "faces_ms": split_ms + s.faces_ms, "upload_ms": s.upload_ms,
             "first_frame_ms": self.first_frame_ms, "frame_ms": s.frame_ms, "transfer_edit_ms": null,
             "steps": s.steps, "repaired_rays": s.repaired_rays,
-            "device_bytes": s.device_bytes, "peak_bytes": peak_bytes(),
+            "device_ms": s.device_ms, "uploaded_bytes": s.uploaded_bytes, "device_bytes": s.device_bytes, "peak_bytes": peak_bytes(),
         })
     }
 }
