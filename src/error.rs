@@ -46,7 +46,9 @@ pub enum Error {
     #[error("{0}")]
     Device(String),
     /// A device has not enough memory.
-    #[error("{device}: {needed} bytes of memory are needed, {allowed} are allowed; another device, or \"cpu\", may have more")]
+    #[error(
+        "{device}: {needed} bytes of memory are needed, {allowed} are allowed; another device, or \"cpu\", may have more"
+    )]
     Memory {
         /// The device.
         device: String,

@@ -101,8 +101,24 @@ fn describe(index: usize, adapter: &wgpu::Adapter) -> Description {
     Description { index, name: info.name, uuid: uuid(adapter), kind, driver, lacks }
 }
 
-/// The adapter's UUID, which wgpu itself does not tell.
-fn uuid(_adapter: &wgpu::Adapter) -> String {
+/// The adapter's UUID, which wgpu itself does not tell; empty where Vulkan is not what drives it.
+#[cfg(any(windows, all(unix, not(target_vendor = "apple"))))]
+#[allow(unsafe_code, reason = "wgpu's own handles, asked through ash")]
+fn uuid(adapter: &wgpu::Adapter) -> String {
+    let mut id = ash::vk::PhysicalDeviceIDProperties::default();
+    let mut properties = ash::vk::PhysicalDeviceProperties2::default().push_next(&mut id);
+    // SAFETY: `hal` keeps instance and physical device alive, and nothing of theirs is changed or destroyed.
+    unsafe {
+        let Some(hal) = adapter.as_hal::<wgpu::hal::api::Vulkan>() else { return String::new() };
+        let instance = hal.shared_instance().raw_instance();
+        instance.get_physical_device_properties2(hal.raw_physical_device(), &mut properties);
+    }
+    let digits: String = id.device_uuid.iter().map(|b| format!("{b:02x}")).collect();
+    [&digits[..8], &digits[8..12], &digits[12..16], &digits[16..20], &digits[20..]].join("-")
+}
+
+#[cfg(not(any(windows, all(unix, not(target_vendor = "apple")))))]
+fn uuid(_: &wgpu::Adapter) -> String {
     String::new()
 }
 

@@ -12,6 +12,7 @@ use crate::transfer::TransferFunction;
 use crate::traverse::gpu::{Part, Traverse};
 use crate::traverse::{Geometry, Values, cpu};
 use crate::view::{Blend, View};
+use glam::DVec3;
 use rayon::prelude::*;
 use std::time::Instant;
 
@@ -112,7 +113,8 @@ impl Renderer {
             opened => opened?.map(Traverse::new),
         };
         let stats = Stats { engine: "traverse".into(), ..Stats::default() };
-        let mut renderer = Renderer { pool, choice, device, mesh: None, field: None, transfer: None, exact: None, stats };
+        let mut renderer =
+            Renderer { pool, choice, device, mesh: None, field: None, transfer: None, exact: None, stats };
         renderer.name_device();
         Ok(renderer)
     }
@@ -157,6 +159,23 @@ impl Renderer {
         self.field = None;
         self.forget(Part::Mesh);
         self.mesh = Some(Loaded { tetrahedra, geometry, points: mesh.points().len(), cells: mesh.cells().len() });
+    }
+
+    /// Moves the points of the mesh; cells, fields and values stay. Cells keep their neighbours, so none may turn inside out,
+    /// and points that shared a position still must; else set the mesh.
+    ///
+    /// # Errors
+    /// [`Error::Render`] if there is no mesh; [`Error::Mesh`] if it has another number of points, or one is not finite.
+    pub fn set_points(&mut self, points: &[DVec3]) -> Result<()> {
+        let mesh = self.mesh.as_mut().ok_or_else(|| Error::Render("points need a mesh first".into()))?;
+        if points.len() != mesh.points || !points.iter().all(|p| p.is_finite()) {
+            return Err(Error::Mesh(format!("{} points, all finite, must take the place of as many", mesh.points)));
+        }
+        self.pool.install(|| mesh.geometry.set_points(points));
+        if let Some(traverse) = &mut self.device {
+            traverse.forget(Part::Points);
+        }
+        Ok(())
     }
 
     /// Draws another field of the mesh from now on.
@@ -290,7 +309,10 @@ impl Frame<'_> {
         };
         let mut drawn = traverse.render(geometry, values, self.exact, self.view)?;
         if self.view.blend() == Blend::Maximum {
-            drawn.pixels.par_iter_mut().for_each(|p| *p = Traverse::largest(p).map_or([0.0; 4], |v: [f32; N]| self.largest(&v)));
+            drawn
+                .pixels
+                .par_iter_mut()
+                .for_each(|p| *p = Traverse::largest(p).map_or([0.0; 4], |v: [f32; N]| self.largest(&v)));
         }
         (self.progress)(1.0);
         let mut image = Image::new(self.view.size());

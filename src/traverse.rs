@@ -93,6 +93,14 @@ impl Geometry {
         Geometry { centre, scale, points, cells, boundary, point_of, tetrahedron_of, welded: faces.weld.is_some() }
     }
 
+    /// Moves the points: `points` are the mesh's, in world coordinates. Cells keep their neighbours, so none may turn inside
+    /// out, and points that shared a position still must.
+    pub fn set_points(&mut self, points: &[DVec3]) {
+        let (centre, scale) = (self.centre, self.scale);
+        self.points = self.point_of.par_iter().map(|&p| (points[p as usize] - centre) * scale).collect();
+        self.boundary.refit(&self.points);
+    }
+
     /// Bytes that the walk reads.
     pub fn bytes(&self) -> u64 {
         (size_of_val(&*self.points) + size_of_val(&*self.cells)) as u64 + self.boundary.bytes()

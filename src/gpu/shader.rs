@@ -90,7 +90,12 @@ pub(crate) fn accessors(arrays: &[Array]) -> String {
 }
 
 /// Compiles a program whose entry point is "main".
-pub(crate) fn compile(gpu: &Gpu, label: &str, source: &str, layouts: &[&wgpu::BindGroupLayout]) -> wgpu::ComputePipeline {
+pub(crate) fn compile(
+    gpu: &Gpu,
+    label: &str,
+    source: &str,
+    layouts: &[&wgpu::BindGroupLayout],
+) -> wgpu::ComputePipeline {
     let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some(label),
         source: wgpu::ShaderSource::Wgsl(source.into()),

@@ -310,7 +310,8 @@ impl Traverse {
         let shared = shader::group(gpu, group_layout, self.chunks()?.into_iter().flat_map(|c| &c.buffers));
         let clock = Clock::new(gpu)?;
 
-        let mut drawn = Drawn { pixels: Vec::with_capacity(w as usize * h as usize), counts: Counts::default(), device_ms: None };
+        let mut drawn =
+            Drawn { pixels: Vec::with_capacity(w as usize * h as usize), counts: Counts::default(), device_ms: None };
         let mut lost = 0;
         for first_row in (0..h).step_by(rows as usize) {
             let rows = rows.min(h - first_row);
@@ -407,10 +408,16 @@ fn program(variant: &Variant, association: &str, blend: Blend, arrays: &[Array])
     ] {
         text += &format!("const {name} = {value:?}f;\n");
     }
-    text += &format!("const NONE = {BOUNDARY}u;\nconst LEAF = {LEAF}u;\nconst MAXIMUM = {};\n", blend == Blend::Maximum);
+    text +=
+        &format!("const NONE = {BOUNDARY}u;\nconst LEAF = {LEAF}u;\nconst MAXIMUM = {};\n", blend == Blend::Maximum);
     text += "const POINT = 0u;\nconst CORNER = 1u;\nconst CELL = 2u;\n";
     text += &format!("const ASSOCIATION = {association};\nstruct Point {{ x: f32, y: f32, z: f32 }}\n");
     text += &shader::accessors(arrays);
+    // XXX
+    if let Ok(dir) = std::env::var("HALITE_SHADERS") {
+        let read = |n: &str| std::fs::read_to_string(format!("{dir}/{n}.wgsl")).unwrap_or_default();
+        return [text, read("cell"), read("integral"), read("traverse")].join("\n");
+    }
     [&text, shader::CELL, shader::INTEGRAL, TRAVERSE].join("\n")
 }
 
@@ -457,7 +464,10 @@ fn outward([low, high]: &[DVec3; 2]) -> Bounds {
     if low.x > high.x {
         return Bounds { low: [1.0; 4], high: [-1.0; 4] };
     }
-    Bounds { low: (low.as_vec3() - MARGIN).extend(0.0).to_array(), high: (high.as_vec3() + MARGIN).extend(0.0).to_array() }
+    Bounds {
+        low: (low.as_vec3() - MARGIN).extend(0.0).to_array(),
+        high: (high.as_vec3() + MARGIN).extend(0.0).to_array(),
+    }
 }
 
 #[cfg(test)]

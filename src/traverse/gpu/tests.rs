@@ -68,8 +68,14 @@ impl Random {
 const KINDS: [Kind; 3] = [Kind::Scalar, Kind::Pair, Kind::Rgba];
 
 fn arrays(chunks: usize) -> Vec<Array> {
-    let names =
-        [("cells", "Cell"), ("faces", "Outer"), ("points", "Point"), ("volumes", "f32"), ("boxes", "Box"), ("values", "Value")];
+    let names = [
+        ("cells", "Cell"),
+        ("faces", "Outer"),
+        ("points", "Point"),
+        ("volumes", "f32"),
+        ("boxes", "Box"),
+        ("values", "Value"),
+    ];
     names.map(|(name, element)| Array { name, element, chunks, shift: 22 }).to_vec()
 }
 
@@ -211,16 +217,14 @@ fn cells_are_walked_as_in_f64() {
     let outcomes: Vec<Outcome> = run(&gpu, &source, &[], &cases);
     let mut entered = 0;
     for (case, outcome) in cases.iter().zip(&outcomes) {
-        let [a, b, c, d] =
-            case.map(|p| Projected { x: f64::from(p[0]), y: f64::from(p[1]), t: f64::from(p[2]) });
+        let [a, b, c, d] = case.map(|p| Projected { x: f64::from(p[0]), y: f64::from(p[1]), t: f64::from(p[2]) });
         let face = Face::enter([a, b, c]);
         assert_eq!(face.is_some(), outcome.entered == 1, "{case:?}");
         let Some(mut face) = face else { continue };
         entered += 1;
         let size = [a, b, c, d].iter().fold(0.0, |m: f64, p| m.max(p.x.abs()).max(p.y.abs()));
-        let near = |got: [f32; 4], want: [f64; 3]| {
-            (0..3).all(|k| (f64::from(got[k]) - want[k]).abs() <= 3e-7 * size * size)
-        };
+        let near =
+            |got: [f32; 4], want: [f64; 3]| (0..3).all(|k| (f64::from(got[k]) - want[k]).abs() <= 3e-7 * size * size);
         assert!(near(outcome.areas, face.areas), "{case:?}");
         assert_eq!(face.step(d) as u32, outcome.dropped, "{case:?}");
         assert!(near(outcome.next, face.areas), "{case:?}");
@@ -262,7 +266,8 @@ fn segments_are_integrated_as_in_f64() {
                     back = front;
                 }
                 let rgb = |v: [f32; 4]| if kind == Kind::Rgba { [v[0].abs(), v[1].abs(), v[2].abs(), v[3]] } else { v };
-                let length = [0.0, 1e-7, 1.0][i % 3] * random.unit() as f32 + 10f64.powf(random.within(-9.0, 1.0)) as f32;
+                let length =
+                    [0.0, 1e-7, 1.0][i % 3] * random.unit() as f32 + 10f64.powf(random.within(-9.0, 1.0)) as f32;
                 [rgb(front), rgb(back), [length; 4]]
             })
             .collect();
@@ -319,8 +324,7 @@ fn random_transfer(random: &mut Random, kind: Kind, direct: bool) -> TransferFun
     };
     let (colors, opacities) = (places(5), places(6));
     let color = colors.into_iter().map(|s| (s, [random.unit(), random.unit(), random.unit()])).collect();
-    let mut opacity: Vec<_> =
-        opacities.into_iter().map(|s| (s, (random.unit() * 1.5 - 0.5).max(0.0))).collect();
+    let mut opacity: Vec<_> = opacities.into_iter().map(|s| (s, (random.unit() * 1.5 - 0.5).max(0.0))).collect();
     // A step.
     opacity[3].0 = opacity[2].0;
     let convention = if random.below(2) == 0 { Convention::Extinction } else { Convention::Opacity };
@@ -349,7 +353,8 @@ fn random_view(random: &mut Random, size: [u32; 2]) -> View {
         let fit = 2.0 * (1.8f64 / distance).atan().to_degrees();
         Projection::Perspective { view_angle: fit.min(random.within(60.0, 110.0)) }
     };
-    let camera = Camera { position: focal_point + away * distance, focal_point, view_up: random.direction(), projection };
+    let camera =
+        Camera { position: focal_point + away * distance, focal_point, view_up: random.direction(), projection };
     let mut view = View::new(camera, size).unwrap();
     if random.below(4) == 0 {
         view = view.with_clipping_range([distance * 0.8, distance * 1.1]).unwrap();
@@ -372,7 +377,12 @@ fn with_arrays(mut mesh: Mesh) -> Mesh {
     let array = |name: &str, n: usize, tuples: usize, at: &dyn Fn(usize) -> DVec3| {
         let values = (0..tuples).flat_map(|t| {
             let p = at(t);
-            let all = [0.5 + 0.5 * (3.0 * p.x).sin(), 0.5 + 0.5 * (2.0 * p.y).cos(), 0.5 + 0.4 * p.z, (4.0 * p.x * p.y).sin()];
+            let all = [
+                0.5 + 0.5 * (3.0 * p.x).sin(),
+                0.5 + 0.5 * (2.0 * p.y).cos(),
+                0.5 + 0.4 * p.z,
+                (4.0 * p.x * p.y).sin(),
+            ];
             all.into_iter().skip(4 - n).collect::<Vec<_>>()
         });
         MeshArray { name: name.into(), components: n, values: MeshValues::F64(values.collect()) }
@@ -421,7 +431,8 @@ fn compare(frames: usize, size: [u32; 2], seed: u64) {
     let mut random = Random(seed);
     let mut worst = (0.0, String::new());
     for (name, mesh) in meshes() {
-        let mut pair = [Renderer::with_device(0, choice.clone()).unwrap(), Renderer::with_device(0, DeviceChoice::Cpu).unwrap()];
+        let mut pair =
+            [Renderer::with_device(0, choice.clone()).unwrap(), Renderer::with_device(0, DeviceChoice::Cpu).unwrap()];
         for r in &mut pair {
             r.set_mesh(&mesh, Tetrahedra::new(&mesh).unwrap());
         }
@@ -447,7 +458,13 @@ fn compare(frames: usize, size: [u32; 2], seed: u64) {
                 }
             }
             if apart > worst.0 {
-                worst = (apart, format!("{name}, frame {frame}: {array} {association:?} {blend:?} {:?} {transfer:?}", view.camera()));
+                worst = (
+                    apart,
+                    format!(
+                        "{name}, frame {frame}: {array} {association:?} {blend:?} {:?} {transfer:?}",
+                        view.camera()
+                    ),
+                );
             }
             if apart > 2e-5 {
                 eprintln!("{apart:.2e}: {name}, frame {frame}: {array} {association:?} {blend:?} {:?}", view.camera());
@@ -502,6 +519,10 @@ fn only_what_changed_is_handed_over() {
     renderer.set_field(&field("rgba")).unwrap();
     let rgba = bytes(&mut renderer) - still;
     assert!(rgba >= 16 * points && rgba < 16 * points + 200_000);
+    let moved: Vec<DVec3> = mesh.points().iter().map(|p| *p * 0.5).collect();
+    renderer.set_points(&moved).unwrap();
+    let placed = bytes(&mut renderer) - still;
+    assert!(placed > 12 * points && placed < 12 * points + 100_000, "{placed}");
 }
 
 #[test]
@@ -548,4 +569,34 @@ fn names_of_devices_are_parsed() {
         let refused = Gpu::open(&DeviceChoice::Named("no such device".into()));
         assert!(matches!(refused, Err(Error::Device(what)) if what.contains("cpu")));
     }
+}
+
+#[test]
+#[ignore = "takes 4 GB and a minute"]
+fn ten_million_tetrahedra_are_drawn() {
+    let Some(choice) = choice() else { return };
+    let mesh = generate::tetrahedra(119);
+    let mut renderer = Renderer::with_device(0, choice).unwrap();
+    renderer.set_mesh(&mesh, Tetrahedra::new(&mesh).unwrap());
+    renderer.set_field(&Field::new(&mesh, "s", None, Component::All).unwrap()).unwrap();
+    let mut random = Random(4);
+    renderer.set_transfer(&random_transfer(&mut random, Kind::Scalar, false));
+    let camera = Camera {
+        position: DVec3::new(3.0, 2.5, 2.0),
+        focal_point: DVec3::ZERO,
+        view_up: DVec3::Z,
+        projection: Projection::Perspective { view_angle: 40.0 },
+    };
+    let view = View::new(camera, [256, 256]).unwrap();
+    let got = draw(&mut renderer, &view);
+    eprintln!("{:#?}", renderer.stats());
+    draw(&mut renderer, &view);
+    eprintln!("again {} ms", renderer.stats().frame_ms);
+    renderer.device().unwrap();
+    renderer.draw_on_cpu(&Error::Render("to compare".into()));
+    let want = draw(&mut renderer, &view);
+    eprintln!("cpu {} ms", renderer.stats().frame_ms);
+    let apart =
+        got.pixels.iter().flatten().zip(want.pixels.iter().flatten()).fold(0.0, |m: f32, (g, w)| m.max((g - w).abs()));
+    assert!(apart <= 2e-5, "{apart:e}");
 }
