@@ -31,6 +31,9 @@ struct Track {
     rise: f32,
 }
 
+/// Iterations of loops so far, about.
+var<private> work: u32;
+
 /// Light gathered from front to back: premultiplied colour, and how much of what lies behind comes through.
 var<private> light: vec4f;
 
@@ -77,6 +80,7 @@ fn quadrature(x: f32, y: f32) -> vec2f {
     }
     let panels = u32(min(max(x, x + (y - x) * end) * end / PANEL, 64.0)) + 1u;
     let width = end / f32(panels);
+    work += panels;
     for (var p = 0u; p < panels; p++) {
         let start = width * f32(p);
         sum += node(x, y, start, width, GAUSS_6_0);
@@ -103,6 +107,20 @@ fn piece(x: f32, y: f32) -> vec3f {
 fn track(first: u32, last: u32, bucket: u32, front: f32, back: f32) -> Track {
     let b = u32(clamp((front + 1.0) * (f32(BUCKETS) / 2.0), 0.0, f32(BUCKETS - 1u)));
     var i = buckets[bucket + b];
+    var above = last - 1u;
+    if b + 1u < BUCKETS {
+        above = buckets[bucket + b + 1u] + 1u;
+    }
+    while above > i + 1u {
+        let middle = (i + above) / 2u;
+        if knots[middle].s <= front {
+            i = middle;
+        } else {
+            above = middle;
+        }
+        work++;
+    }
+    // Where rounding chose the bucket beside.
     while i > first && knots[i].s > front {
         i--;
     }
@@ -180,7 +198,8 @@ fn add_segment(front: Value, back: Value, length: f32) {
             b = vec4f(b.x, (color_of(front) + rise * next) * function.scale);
         }
         add_piece(f, b, (next - u) * length);
-        if next >= 1.0 || light.w <= 0.0 {
+        work++;
+        if next >= 1.0 || light.w <= 0.0 || work > most_work() {
             return;
         }
         if opacity_end <= next {

@@ -36,10 +36,11 @@ struct Frame {
     planes: u32,
     /// Whether `ends` holds a value for each pixel of the image.
     has_ends: u32,
-    /// Number of leaves of the hierarchy, of faces, and of steps that no walk exceeds.
+    /// Number of leaves of the hierarchy, of faces, of steps that no walk exceeds, and of loop iterations that no ray may.
     leaves: u32,
     faces: u32,
     most_steps: u32,
+    most_work: u32,
 }
 
 /// What happened, over all rays.
@@ -47,9 +48,9 @@ struct Counts {
     /// Tetrahedra visited: low and high digits.
     steps: atomic<u32>,
     carry: atomic<u32>,
-    /// Rays that were traced again beside their place, and those that still found no way.
+    /// Rays that were traced again beside their place.
     repaired: atomic<u32>,
-    lost: atomic<u32>,
+    unused: u32,
 }
 
 @group(0) @binding(3) var<uniform> frame: Frame;
@@ -72,6 +73,9 @@ struct Entry {
 /// The largest values along a ray; the last of them at −FAR if there are none.
 var<private> largest: Value;
 var<private> steps: u32;
+/// Whether all of the ray was walked: llvmpipe leaves loops after 65,535 iterations of all loops of 8 rays together, so that
+/// rays which take much work are given up before, and the CPU draws them.
+var<private> finished: bool;
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -95,8 +99,11 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         limits = clipped(limits, dot(origin, planes[k].xyz) + planes[k].w, dot(straight.along, planes[k].xyz));
     }
     steps = 0u;
+    work = 0u;
     trace(straight, limits);
-    if MAXIMUM {
+    if !finished {
+        pixels[id.y * frame.size.x + id.x] = vec4f(0.0, 0.0, 0.0, UNFINISHED);
+    } else if MAXIMUM {
         pixels[id.y * frame.size.x + id.x] = padded(largest);
     } else {
         pixels[id.y * frame.size.x + id.x] = vec4f(light.xyz, 1.0 - light.w);
@@ -105,6 +112,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if before + steps < before {
         atomicAdd(&counts.carry, 1u);
     }
+}
+
+fn most_work() -> u32 {
+    return frame.most_work;
 }
 
 /// What a plane at this height over the ray's start leaves of it.
@@ -125,22 +136,24 @@ fn trace(straight: Ray, limits: vec2f) {
     for (var attempt = 1u; attempt <= 3u; attempt++) {
         light = vec4f(0.0, 0.0, 0.0, 1.0);
         largest = Value(-FAR);
-        if follow(ray, limits) {
+        finished = false;
+        follow(ray, limits);
+        if finished || work > frame.most_work {
             return;
         }
         let aside = ASIDE * f32(attempt);
         ray.origin = straight.origin + (straight.right + straight.up * 0.618) * aside;
         atomicAdd(&counts.repaired, select(0u, 1u, attempt == 1u));
     }
-    atomicAdd(&counts.lost, 1u);
 }
 
-/// Walks from each entry to the next; false if the ray got lost.
-fn follow(ray: Ray, limits: vec2f) -> bool {
+/// Walks from each entry to the next.
+fn follow(ray: Ray, limits: vec2f) {
     let inverse = 1.0 / select(ray.along, vec3f(1e-20), abs(ray.along) < vec3f(1e-20));
     let inside = span(boxes(0u), ray, inverse);
     if inside.x > inside.y || inside.y < limits.x || inside.x > limits.y || limits.x >= limits.y {
-        return true;
+        finished = true;
+        return;
     }
     var entry: Entry;
     entry.t = -FAR;
@@ -148,16 +161,17 @@ fn follow(ray: Ray, limits: vec2f) -> bool {
     loop {
         entry = next_entry(ray, inverse, entry.t, entry.index, limits.y);
         if entry.index == NONE {
-            break;
+            finished = work <= frame.most_work;
+            return;
         }
         if !walk(ray, entry, limits) {
-            return false;
+            return;
         }
         if light.w < NEGLIGIBLE {
-            break;
+            finished = work <= frame.most_work;
+            return;
         }
     }
-    return true;
 }
 
 /// Where a ray enters and leaves a box.
@@ -177,6 +191,10 @@ fn next_entry(ray: Ray, inverse: vec3f, after: f32, index: u32, limit: f32) -> E
     // The children of node n are 2n and 2n + 1; the root is node 1.
     var n = 1u;
     loop {
+        work++;
+        if work > frame.most_work {
+            break;
+        }
         let b = boxes(n - 1u);
         let inside = span(b, ray, inverse);
         let meets = b.low.x <= b.high.x && inside.x <= inside.y && inside.x <= best.t && inside.y >= after;
@@ -186,6 +204,7 @@ fn next_entry(ray: Ray, inverse: vec3f, after: f32, index: u32, limit: f32) -> E
         }
         if meets {
             let first = (n - frame.leaves) * LEAF;
+            work += LEAF;
             for (var k = first; k < min(first + LEAF, frame.faces); k++) {
                 let outer = faces(k);
                 // Seen along a ray that enters, the face turns clockwise: its mirror image does not.
@@ -236,6 +255,10 @@ fn walk(ray: Ray, entry: Entry, limits: vec2f) -> bool {
     }
     for (var left = frame.most_steps; left > 0u; left--) {
         steps++;
+        work++;
+        if work > frame.most_work {
+            return false;
+        }
         let c = cells(cell);
         let apex = c.corners.x ^ c.corners.y ^ c.corners.z ^ c.corners.w ^ ids.x ^ ids.y ^ ids.z;
         let p = project(ray, position(apex));

@@ -302,18 +302,22 @@ impl Frame<'_> {
         device: &mut Option<Traverse>,
     ) -> Result<(Image, cpu::Counts, Option<f64>)> {
         let geometry = &self.mesh.geometry;
+        let pixel = |v: &[f32; N]| self.largest(v);
         let Some(traverse) = device else {
-            let pixel = |v: &[f32; N]| self.largest(v);
             let (image, counts) = cpu::render(geometry, values, self.exact, &pixel, self.view, self.progress);
             return Ok((image, counts, None));
         };
         let mut drawn = traverse.render(geometry, values, self.exact, self.view)?;
+        let unfinished = Traverse::unfinished(&drawn.pixels);
         if self.view.blend() == Blend::Maximum {
             drawn
                 .pixels
                 .par_iter_mut()
-                .for_each(|p| *p = Traverse::largest(p).map_or([0.0; 4], |v: [f32; N]| self.largest(&v)));
+                .for_each(|p| *p = Traverse::largest(p).map_or([0.0; 4], |v: [f32; N]| pixel(&v)));
         }
+        let by_cpu = cpu::render_pixels(geometry, values, self.exact, &pixel, self.view, &unfinished);
+        unfinished.iter().zip(by_cpu).for_each(|(&i, p)| drawn.pixels[i] = p);
+        drawn.counts.repaired += unfinished.len() as u64;
         (self.progress)(1.0);
         let mut image = Image::new(self.view.size());
         image.pixels = drawn.pixels;

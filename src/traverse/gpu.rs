@@ -22,8 +22,14 @@ const TRAVERSE: &str = include_str!("../../shaders/traverse.wgsl");
 /// Rays of one dispatch at most: a driver ends work that takes seconds.
 const RAYS: u64 = 1 << 21;
 
+/// Loop iterations of one ray that llvmpipe surely makes: an eighth of those that 8 rays may make together.
+const LLVMPIPE_WORK: u32 = 8000;
+
 /// Stands for ±∞ in limits of t, which are within ±10 else.
 const FAR: f32 = 1e30;
+
+/// Opacity of a pixel whose ray the device did not finish.
+const UNFINISHED: f32 = -2e30;
 
 /// Stands for a value that is not finite; the shader takes all above 1e38 for such.
 const INVISIBLE: f32 = 3e38;
@@ -59,7 +65,8 @@ struct Frame {
     leaves: u32,
     faces: u32,
     most_steps: u32,
-    padding: [u32; 3],
+    most_work: u32,
+    padding: [u32; 2],
 }
 
 /// `Function` in the shader.
@@ -105,7 +112,7 @@ struct RawCounts {
     steps: u32,
     carry: u32,
     repaired: u32,
-    lost: u32,
+    unused: u32,
 }
 
 /// What a frame depends on, apart from the view: each part is handed over again only after it was forgotten.
@@ -230,6 +237,11 @@ impl Traverse {
         self.draw(geometry, view)
     }
 
+    /// The pixels whose rays the device did not finish, as indices.
+    pub(crate) fn unfinished(pixels: &[[f32; 4]]) -> Vec<usize> {
+        pixels.par_iter().enumerate().filter(|(_, p)| p[3] == UNFINISHED).map(|(i, _)| i).collect()
+    }
+
     /// The largest values along the ray of a pixel drawn with [`Blend::Maximum`]; none if it met nothing.
     pub(crate) fn largest<const N: usize>(pixel: &[f32; 4]) -> Option<[f32; N]> {
         // The first values come first, the last one last.
@@ -294,7 +306,8 @@ impl Traverse {
             leaves: geometry.boundary.boxes().len().div_ceil(2) as u32,
             faces: geometry.boundary.faces.len() as u32,
             most_steps: geometry.cells.len() as u32,
-            padding: [0; 3],
+            most_work: if gpu.adapter.kind == "CPU" { LLVMPIPE_WORK } else { u32::MAX },
+            padding: [0; 2],
         };
         let rows = (RAYS / u64::from(w)).clamp(1, u64::from(h)) as u32;
         let size = u64::from(w) * u64::from(rows) * 16;
@@ -312,7 +325,6 @@ impl Traverse {
 
         let mut drawn =
             Drawn { pixels: Vec::with_capacity(w as usize * h as usize), counts: Counts::default(), device_ms: None };
-        let mut lost = 0;
         for first_row in (0..h).step_by(rows as usize) {
             let rows = rows.min(h - first_row);
             frame_buffer.write(gpu, 0, bytemuck::bytes_of(&Frame { first_row, rows, ..frame }));
@@ -349,7 +361,6 @@ impl Traverse {
                 let c: RawCounts = bytemuck::pod_read_unaligned(&rest[..16]);
                 drawn.counts.steps += u64::from(c.carry) << 32 | u64::from(c.steps);
                 drawn.counts.repaired += u64::from(c.repaired);
-                lost += c.lost;
                 if clock.is_some() {
                     let [start, end]: [u64; 2] = bytemuck::pod_read_unaligned(&rest[16..32]);
                     let ms = end.saturating_sub(start) as f64 * f64::from(gpu.queue.get_timestamp_period()) / 1e6;
@@ -357,9 +368,6 @@ impl Traverse {
                 }
             }
             back.raw.unmap();
-        }
-        if lost > 0 {
-            tracing::warn!("{lost} rays found no way through the mesh on {}", gpu.adapter.name);
         }
         Ok(drawn)
     }
@@ -400,6 +408,7 @@ fn program(variant: &Variant, association: &str, blend: Blend, arrays: &[Array])
     let mut text = shader::prelude(variant);
     for (name, value) in [
         ("FAR", f64::from(FAR)),
+        ("UNFINISHED", f64::from(UNFINISHED)),
         ("INVISIBLE", f64::from(INVISIBLE)),
         ("SHARP", f64::from(SHARP)),
         ("SLACK", f64::from(MARGIN)),
@@ -413,11 +422,6 @@ fn program(variant: &Variant, association: &str, blend: Blend, arrays: &[Array])
     text += "const POINT = 0u;\nconst CORNER = 1u;\nconst CELL = 2u;\n";
     text += &format!("const ASSOCIATION = {association};\nstruct Point {{ x: f32, y: f32, z: f32 }}\n");
     text += &shader::accessors(arrays);
-    // XXX
-    if let Ok(dir) = std::env::var("HALITE_SHADERS") {
-        let read = |n: &str| std::fs::read_to_string(format!("{dir}/{n}.wgsl")).unwrap_or_default();
-        return [text, read("cell"), read("integral"), read("traverse")].join("\n");
-    }
     [&text, shader::CELL, shader::INTEGRAL, TRAVERSE].join("\n")
 }
 

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::cell::{Face, Projected};
-use crate::field::{Association, Component, Field, Normal};
+use crate::field::{Association, Component, Field, Kind, Normal};
 use crate::gpu::DeviceChoice;
 use crate::image::Image;
 use crate::integral::Light;
@@ -125,8 +125,8 @@ fn layouts_match_their_rust_twins() {
     check!("Box", Bounds, low high);
     check!("Knot", Knot, value slope s);
     check!("Function", Function, opacity color end scale);
-    check!("Counts", RawCounts, steps carry repaired lost);
-    check!("Frame", Frame, origin direction size first_row rows offset near far planes has_ends leaves faces most_steps);
+    check!("Counts", RawCounts, steps carry repaired unused);
+    check!("Frame", Frame, origin direction size first_row rows offset near far planes has_ends leaves faces most_steps most_work);
     check("Point", 12, &[0, 4, 8]);
 }
 
@@ -233,6 +233,7 @@ fn cells_are_walked_as_in_f64() {
 }
 
 const INTEGRAL_TEST: &str = "
+fn most_work() -> u32 { return 0xffffffffu; }
 struct Case { front: vec4f, back: vec4f, length: vec4f }
 @group(1) @binding(0) var<storage, read> cases: array<Case>;
 @group(1) @binding(1) var<storage, read_write> outcomes: array<vec4f>;
