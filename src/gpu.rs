@@ -229,7 +229,12 @@ impl Gpu {
     /// # Errors
     /// [`Error::Lost`] if the device is gone, [`Error::Memory`] if it has no more memory, [`Error::Device`] if it refused a call.
     pub(crate) fn check(&self) -> Result<()> {
-        let mut fault = self.fault.lock().unwrap_or_else(PoisonError::into_inner);
+        let fault = || self.fault.lock().unwrap_or_else(PoisonError::into_inner);
+        if fault().is_some() {
+            // A lost device refuses calls before it says that it is lost, which it does when polled.
+            let _ = self.device.poll(wgpu::PollType::Poll);
+        }
+        let mut fault = fault();
         let name = &self.adapter.name;
         match fault.clone() {
             None => Ok(()),

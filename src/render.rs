@@ -236,7 +236,7 @@ impl Renderer {
         }
     }
 
-    fn draw_on_cpu(&mut self, why: &Error) {
+    pub(crate) fn draw_on_cpu(&mut self, why: &Error) {
         tracing::warn!("{why}; now drawing on the CPU");
         self.device = None;
         self.name_device();

@@ -43,7 +43,7 @@ const MARGIN: f32 = 2e-6;
 const SHARP: f32 = 2e-6;
 
 /// Up to this distance from the mesh's centre, in normalised units, rays start at the eye.
-const NEAR_EYE: f64 = 4.0;
+const NEAR_EYE: f64 = 2.0;
 
 /// How far aside, in normalised units, a lost ray is tried again.
 const ASIDE: f32 = 2e-7;
