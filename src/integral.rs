@@ -16,6 +16,7 @@ mod batch;
 mod knots;
 
 pub use batch::Batch;
+pub(crate) use knots::BUCKETS;
 pub use knots::Knots;
 
 use crate::field::{Kind, Normal};
