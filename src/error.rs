@@ -42,6 +42,24 @@ pub enum Error {
     /// A camera, image size, depth buffer or clipping that cannot be used.
     #[error("the view is not valid: {0}")]
     View(String),
+    /// There is no such device, it is of no use, or it refused a call.
+    #[error("{0}")]
+    Device(String),
+    /// A device has not enough memory.
+    #[error(
+        "{device}: {needed} bytes of memory are needed, {allowed} are allowed; another device, or \"cpu\", may have more"
+    )]
+    Memory {
+        /// The device.
+        device: String,
+        /// Bytes that would be allocated then.
+        needed: u64,
+        /// Bytes that may be.
+        allowed: u64,
+    },
+    /// A device is gone: unplugged, reset, or its driver failed.
+    #[error("{0}")]
+    Lost(String),
     /// The renderer was asked for a frame before it had what it needs, or after it failed.
     #[error("{0}")]
     Render(String),

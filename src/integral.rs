@@ -16,6 +16,7 @@ mod batch;
 mod knots;
 
 pub use batch::Batch;
+pub(crate) use knots::BUCKETS;
 pub use knots::Knots;
 
 use crate::field::{Kind, Normal};
@@ -25,10 +26,10 @@ use knots::{Side, Track, compile, extinction, sample};
 
 /// Extinction that stands for "opaque", per normalised unit of length: even the thinnest slab that f32 can tell from
 /// nothing is then opaque, and its square is still finite.
-const OPAQUE_EXTINCTION: f64 = 1e15;
+pub(crate) const OPAQUE_EXTINCTION: f64 = 1e15;
 
 /// Optical depth beyond which e^{−T} is nothing in f32.
-const DEEP: f64 = 18.0;
+pub(crate) const DEEP: f64 = 18.0;
 
 /// Nodes in [0, 1] and weights of the 3-point Gauss–Legendre rule.
 pub(crate) const GAUSS_3: [[f64; 2]; 3] =

@@ -16,6 +16,7 @@
 pub mod cell;
 pub mod error;
 pub mod field;
+pub mod gpu;
 pub mod image;
 pub mod integral;
 pub mod io;

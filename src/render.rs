@@ -2,20 +2,27 @@
 
 use crate::error::{Error, Result};
 use crate::field::{Field, Kind, Normal};
+use crate::gpu::{DeviceChoice, Gpu};
 use crate::image::Image;
 use crate::integral::Exact;
 use crate::mesh::Mesh;
 use crate::mesh::cells::Tetrahedra;
 use crate::mesh::faces::Faces;
 use crate::transfer::TransferFunction;
+use crate::traverse::gpu::{Part, Traverse};
 use crate::traverse::{Geometry, Values, cpu};
-use crate::view::View;
+use crate::view::{Blend, View};
+use glam::DVec3;
+use rayon::prelude::*;
 use std::time::Instant;
 
 /// Draws one mesh, as often as wanted; keeps what did not change between frames.
 #[derive(Debug)]
 pub struct Renderer {
     pool: rayon::ThreadPool,
+    choice: DeviceChoice,
+    /// None where the CPU draws.
+    device: Option<Traverse>,
     mesh: Option<Loaded>,
     field: Option<Prepared>,
     transfer: Option<TransferFunction>,
@@ -71,26 +78,66 @@ pub struct Stats {
     pub repaired_rays: u64,
     /// Memory held on the device for mesh and field, in bytes.
     pub device_bytes: u64,
+    /// What had to be handed to the device for the last frame, in bytes; 0 on the CPU.
+    pub uploaded_bytes: u64,
+    /// The last frame by the device's own clock, in ms, where it has one.
+    pub device_ms: Option<f64>,
 }
 
 impl Renderer {
-    /// A renderer on `threads` threads of its own (0: one for each core).
+    /// A renderer on `threads` threads of its own (0: one for each core) and the best device.
     ///
     /// # Errors
-    /// [`Error::Render`] if the threads cannot be started.
+    /// As [`Self::with_device`].
     pub fn new(threads: usize) -> Result<Self> {
+        Self::with_device(threads, DeviceChoice::Auto)
+    }
+
+    /// A renderer on `threads` threads of its own and the chosen device.
+    ///
+    /// # Errors
+    /// [`Error::Render`] if the threads cannot be started; [`Error::Device`] if the device is none of this machine's, or
+    /// cannot be used. With [`DeviceChoice::Auto`] the CPU draws then.
+    pub fn with_device(threads: usize, choice: DeviceChoice) -> Result<Self> {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .thread_name(|i| format!("halite-{i}"))
             .build()
             .map_err(|e| Error::Render(format!("cannot start {threads} threads: {e}")))?;
-        let stats = Stats {
-            engine: "traverse".into(),
-            device: "cpu".into(),
-            adapter: format!("{} threads", pool.current_num_threads()),
-            ..Stats::default()
+        let choice = choice.or_environment();
+        let device = match Gpu::open(&choice) {
+            Err(e) if choice == DeviceChoice::Auto => {
+                tracing::warn!("drawing on the CPU: {e}");
+                None
+            }
+            opened => opened?.map(Traverse::new),
         };
-        Ok(Renderer { pool, mesh: None, field: None, transfer: None, exact: None, stats })
+        let stats = Stats { engine: "traverse".into(), ..Stats::default() };
+        let mut renderer =
+            Renderer { pool, choice, device, mesh: None, field: None, transfer: None, exact: None, stats };
+        renderer.name_device();
+        Ok(renderer)
+    }
+
+    #[cfg(test)]
+    pub(crate) fn device(&mut self) -> Option<&mut Traverse> {
+        self.device.as_mut()
+    }
+
+    fn name_device(&mut self) {
+        (self.stats.device, self.stats.adapter) = match &self.device {
+            Some(traverse) => ("gpu".into(), traverse.gpu().adapter.name.clone()),
+            None => ("cpu".into(), format!("{} threads", self.pool.current_num_threads())),
+        };
+    }
+
+    /// Takes `part` for changed, wherever it is kept.
+    fn forget(&mut self, part: Part) {
+        self.exact = None;
+        if let Some(traverse) = &mut self.device {
+            traverse.forget(part);
+            traverse.forget(Part::Function);
+        }
     }
 
     /// Runs `work`, such as reading a file, on the renderer's threads.
@@ -109,8 +156,26 @@ impl Renderer {
         self.stats.cells = mesh.cells().len() as u64;
         self.stats.tetrahedra = tetrahedra.corners.len() as u64;
         self.stats.device_bytes = geometry.bytes();
-        (self.field, self.exact) = (None, None);
+        self.field = None;
+        self.forget(Part::Mesh);
         self.mesh = Some(Loaded { tetrahedra, geometry, points: mesh.points().len(), cells: mesh.cells().len() });
+    }
+
+    /// Moves the points of the mesh; cells, fields and values stay. Cells keep their neighbours, so none may turn inside out,
+    /// and points that shared a position still must; else set the mesh.
+    ///
+    /// # Errors
+    /// [`Error::Render`] if there is no mesh; [`Error::Mesh`] if it has another number of points, or one is not finite.
+    pub fn set_points(&mut self, points: &[DVec3]) -> Result<()> {
+        let mesh = self.mesh.as_mut().ok_or_else(|| Error::Render("points need a mesh first".into()))?;
+        if points.len() != mesh.points || !points.iter().all(|p| p.is_finite()) {
+            return Err(Error::Mesh(format!("{} points, all finite, must take the place of as many", mesh.points)));
+        }
+        self.pool.install(|| mesh.geometry.set_points(points));
+        if let Some(traverse) = &mut self.device {
+            traverse.forget(Part::Points);
+        }
+        Ok(())
     }
 
     /// Draws another field of the mesh from now on.
@@ -132,7 +197,7 @@ impl Renderer {
                 AnyValues::Rgba(v) => v.bytes(),
             };
         self.field = Some(Prepared { normal: [0, 1, 2, 3].map(|k| field.normal(k)), values });
-        self.exact = None;
+        self.forget(Part::Field);
         self.stats.upload_ms = ms(start);
         Ok(())
     }
@@ -140,14 +205,44 @@ impl Renderer {
     /// Draws with another transfer function from now on.
     pub fn set_transfer(&mut self, transfer: &TransferFunction) {
         self.transfer = Some(transfer.clone());
-        self.exact = None;
+        self.forget(Part::Function);
     }
 
     /// Draws a frame. `progress` is told the share that is done, in [0, 1], and may be called from several threads.
     ///
+    /// A device that is lost is opened again, once a frame; where that fails, the CPU draws from then on.
+    ///
     /// # Errors
-    /// [`Error::Render`] if mesh, field or transfer function were never set.
+    /// [`Error::Render`] if mesh, field or transfer function were never set; [`Error::Memory`] if they do not fit the device,
+    /// and [`Error::Device`] if it refuses them, unless it was not named.
     pub fn render(&mut self, view: &View, progress: &(dyn Fn(f64) + Sync)) -> Result<Image> {
+        match self.try_render(view, progress) {
+            Err(Error::Lost(why)) => {
+                self.device = Gpu::open(&self.choice).unwrap_or_default().map(Traverse::new);
+                self.name_device();
+                tracing::warn!("{why}; now drawing on {} ({})", self.stats.device, self.stats.adapter);
+            }
+            Err(e @ (Error::Memory { .. } | Error::Device(_))) if self.choice == DeviceChoice::Auto => {
+                self.draw_on_cpu(&e);
+            }
+            done => return done,
+        }
+        match self.try_render(view, progress) {
+            Err(e @ Error::Lost(_)) => {
+                self.draw_on_cpu(&e);
+                self.try_render(view, progress)
+            }
+            done => done,
+        }
+    }
+
+    pub(crate) fn draw_on_cpu(&mut self, why: &Error) {
+        tracing::warn!("{why}; now drawing on the CPU");
+        self.device = None;
+        self.name_device();
+    }
+
+    fn try_render(&mut self, view: &View, progress: &(dyn Fn(f64) + Sync)) -> Result<Image> {
         let start = Instant::now();
         let missing = |what: &str| Error::Render(format!("there is no {what} to draw"));
         let mesh = self.mesh.as_ref().ok_or_else(|| missing("mesh"))?;
@@ -160,11 +255,18 @@ impl Renderer {
         };
         let exact = self.exact.get_or_insert_with(|| Exact::new(transfer, kind, &field.normal, mesh.geometry.scale));
         let frame = Frame { mesh, field, transfer, exact, view, progress };
-        let (image, counts) = self.pool.install(|| match &field.values {
-            AnyValues::Scalar(v) => frame.render(v),
-            AnyValues::Pair(v) => frame.render(v),
-            AnyValues::Rgba(v) => frame.render(v),
-        });
+        let device = &mut self.device;
+        let uploaded = device.as_ref().map_or(0, |t| t.gpu().uploaded());
+        let (image, counts, device_ms) = self.pool.install(|| match &field.values {
+            AnyValues::Scalar(v) => frame.render(v, device),
+            AnyValues::Pair(v) => frame.render(v, device),
+            AnyValues::Rgba(v) => frame.render(v, device),
+        })?;
+        if let Some(traverse) = device {
+            self.stats.uploaded_bytes = traverse.gpu().uploaded() - uploaded;
+            self.stats.device_bytes = traverse.gpu().allocated();
+        }
+        self.stats.device_ms = device_ms;
         self.stats.steps = counts.steps;
         self.stats.repaired_rays = counts.repaired;
         self.stats.frame_ms = ms(start);
@@ -194,8 +296,32 @@ struct Frame<'a> {
 }
 
 impl Frame<'_> {
-    fn render<const N: usize>(&self, values: &Values<N>) -> (Image, cpu::Counts) {
-        cpu::render(&self.mesh.geometry, values, self.exact, &|v| self.largest(v), self.view, self.progress)
+    fn render<const N: usize>(
+        &self,
+        values: &Values<N>,
+        device: &mut Option<Traverse>,
+    ) -> Result<(Image, cpu::Counts, Option<f64>)> {
+        let geometry = &self.mesh.geometry;
+        let pixel = |v: &[f32; N]| self.largest(v);
+        let Some(traverse) = device else {
+            let (image, counts) = cpu::render(geometry, values, self.exact, &pixel, self.view, self.progress);
+            return Ok((image, counts, None));
+        };
+        let mut drawn = traverse.render(geometry, values, self.exact, self.view)?;
+        let unfinished = Traverse::unfinished(&drawn.pixels);
+        if self.view.blend() == Blend::Maximum {
+            drawn
+                .pixels
+                .par_iter_mut()
+                .for_each(|p| *p = Traverse::largest(p).map_or([0.0; 4], |v: [f32; N]| pixel(&v)));
+        }
+        let by_cpu = cpu::render_pixels(geometry, values, self.exact, &pixel, self.view, &unfinished);
+        unfinished.iter().zip(by_cpu).for_each(|(&i, p)| drawn.pixels[i] = p);
+        drawn.counts.repaired += unfinished.len() as u64;
+        (self.progress)(1.0);
+        let mut image = Image::new(self.view.size());
+        image.pixels = drawn.pixels;
+        Ok((image, drawn.counts, drawn.device_ms))
     }
 
     /// The pixel of a ray whose largest values are `v`: colour and opacity there, premultiplied.

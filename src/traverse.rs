@@ -1,10 +1,12 @@
 //! The traverse engine: each pixel's ray walks from cell to neighbouring cell through shared faces.
 //!
 //! A ray enters a connected part of the mesh through each boundary face that it meets from outside, and walks until it
-//! leaves. [`Geometry`] is what the walk needs of a mesh, [`boundary`] finds the entries, [`cpu`] walks.
+//! leaves. [`Geometry`] is what the walk needs of a mesh, [`boundary`] finds the entries, [`cpu`] walks; `gpu` does
+//! both on a GPU.
 
 pub mod boundary;
 pub mod cpu;
+pub(crate) mod gpu;
 
 use crate::error::{Error, Result};
 use crate::field::{Association, Field};
@@ -89,6 +91,14 @@ impl Geometry {
             .collect();
         let boundary = Boundary::new(&points, boundary);
         Geometry { centre, scale, points, cells, boundary, point_of, tetrahedron_of, welded: faces.weld.is_some() }
+    }
+
+    /// Moves the points: `points` are the mesh's, in world coordinates. Cells keep their neighbours, so none may turn inside
+    /// out, and points that shared a position still must.
+    pub fn set_points(&mut self, points: &[DVec3]) {
+        let (centre, scale) = (self.centre, self.scale);
+        self.points = self.point_of.par_iter().map(|&p| (points[p as usize] - centre) * scale).collect();
+        self.boundary.refit(&self.points);
     }
 
     /// Bytes that the walk reads.

@@ -83,6 +83,24 @@ pub struct Ray {
     pub t_max: f64,
 }
 
+/// All rays of a view in one affine form, in normalised coordinates: at (x, y), each in [−1, 1] across the image, a ray
+/// starts at origin · (1, x, y) and runs along direction · (1, x, y), which is not of unit length.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fan {
+    /// Where rays start: for the middle of the image, and per x and y.
+    pub origin: [DVec3; 3],
+    /// Where they run; the first is the view direction, of unit length.
+    pub direction: [DVec3; 3],
+    /// From the camera to where the rays start, along the view direction.
+    pub ahead: f64,
+    /// Where what is seen of a ray starts, in lengths of its direction from its origin; may be −∞.
+    pub near: f64,
+    /// Where it ends; may be ∞. Clipping planes and depths are not in it.
+    pub far: f64,
+    /// Where in a pixel its ray passes, in x and y from its centre.
+    pub offset: DVec2,
+}
+
 /// What to draw: the camera, the size of the image and everything that limits the rays.
 #[derive(Debug, Clone, PartialEq)]
 pub struct View {
@@ -211,6 +229,16 @@ impl View {
         self.blend
     }
 
+    /// The clipping planes.
+    pub fn clipping_planes(&self) -> &[ClippingPlane] {
+        &self.clipping_planes
+    }
+
+    /// Whether a depth buffer ends rays.
+    pub fn has_depth(&self) -> bool {
+        self.depth.is_some()
+    }
+
     /// The sampling offset, in pixels.
     pub fn pixel_offset(&self) -> DVec2 {
         self.pixel_offset
@@ -246,6 +274,33 @@ impl View {
             Projection::Parallel { parallel_scale: s } => {
                 let origin = self.camera.position + right * (ndc.x * s * w / h) + up * (ndc.y * s);
                 Ray { origin, direction: forward, t_min: f64::NEG_INFINITY, t_max: f64::INFINITY }
+            }
+        }
+    }
+
+    /// The view's rays as one affine form, in coordinates (world − `centre`) · `scale`. They start near the centre, so that f32
+    /// can tell their places; but at the eye of a perspective view if that is not beyond `near_eye` from it.
+    pub fn fan(&self, centre: DVec3, scale: f64, near_eye: f64) -> Fan {
+        let [w, h] = self.size.map(f64::from);
+        let [right, up, forward] = self.axes;
+        let eye = (self.camera.position - centre) * scale;
+        let offset = DVec2::new(2.0 * self.pixel_offset.x / w, 2.0 * self.pixel_offset.y / h);
+        let mut ahead = -eye.dot(forward);
+        let [near, far] = self.clipping_range.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+        match self.camera.projection {
+            Projection::Perspective { view_angle } => {
+                if eye.length() <= near_eye || ahead < 0.0 {
+                    ahead = 0.0;
+                }
+                let tan = (view_angle.to_radians() / 2.0).tan();
+                let direction = [forward, right * (tan * w / h), up * tan];
+                let origin = [eye + forward * ahead, direction[1] * ahead, direction[2] * ahead];
+                Fan { origin, direction, ahead, near: near.max(0.0) * scale - ahead, far: far * scale - ahead, offset }
+            }
+            Projection::Parallel { parallel_scale: s } => {
+                let origin = [eye + forward * ahead, right * (s * scale * w / h), up * (s * scale)];
+                let direction = [forward, DVec3::ZERO, DVec3::ZERO];
+                Fan { origin, direction, ahead, near: near * scale - ahead, far: far * scale - ahead, offset }
             }
         }
     }

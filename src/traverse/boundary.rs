@@ -13,7 +13,7 @@ pub struct BoundaryFace {
 }
 
 /// Faces in each leaf.
-const LEAF: usize = 4;
+pub(crate) const LEAF: usize = 4;
 
 /// The boundary faces along a space-filling curve, under a complete binary tree of boxes.
 #[derive(Debug, Clone, Default)]
@@ -91,6 +91,11 @@ impl Boundary {
     /// The box around all faces.
     pub fn bounds(&self) -> [DVec3; 2] {
         self.boxes.first().copied().unwrap_or([DVec3::ZERO; 2])
+    }
+
+    /// The nodes; those of no face have `low.x > high.x`.
+    pub(crate) fn boxes(&self) -> &[[DVec3; 2]] {
+        &self.boxes
     }
 
     /// Bytes held.

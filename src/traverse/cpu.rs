@@ -65,6 +65,25 @@ pub fn render<const N: usize>(
     (image, counts)
 }
 
+/// Draws only the pixels with these indices.
+pub(crate) fn render_pixels<const N: usize>(
+    geometry: &Geometry,
+    values: &Values<N>,
+    exact: &Exact<f32>,
+    pixel: &(dyn Fn(&[f32; N]) -> [f32; 4] + Sync),
+    view: &View,
+    indices: &[usize],
+) -> Vec<[f32; 4]> {
+    let w = view.size()[0];
+    let new = || Tracer::new(geometry, values, exact, view);
+    let draw = |tracer: &mut Tracer<N>, &index: &usize| {
+        let (i, j) = ((index % w as usize) as u32, (index / w as usize) as u32);
+        tracer.find_candidates([i, j], [i + 1, j + 1]);
+        tracer.pixel(i, j, pixel)
+    };
+    indices.par_iter().map_init(new, draw).collect()
+}
+
 /// A place where a ray enters the mesh.
 struct Entry {
     t: f64,
@@ -121,16 +140,21 @@ impl<'a, const N: usize> Tracer<'a, N> {
         }
         for j in top..bottom {
             for i in left..right {
-                let gathered = self.trace(i, j);
-                rows[((j - top) * w + i) as usize] = match (self.view.blend(), gathered.largest) {
-                    (Blend::Composite, _) => {
-                        let Light { color: [r, g, b], through } = gathered.light;
-                        [r, g, b, 1.0 - through]
-                    }
-                    (Blend::Maximum, Some(values)) => pixel(&values),
-                    (Blend::Maximum, None) => [0.0; 4],
-                };
+                rows[((j - top) * w + i) as usize] = self.pixel(i, j, pixel);
             }
+        }
+    }
+
+    /// Draws one pixel, whose candidates were found.
+    fn pixel(&mut self, i: u32, j: u32, pixel: &(dyn Fn(&[f32; N]) -> [f32; 4] + Sync)) -> [f32; 4] {
+        let gathered = self.trace(i, j);
+        match (self.view.blend(), gathered.largest) {
+            (Blend::Composite, _) => {
+                let Light { color: [r, g, b], through } = gathered.light;
+                [r, g, b, 1.0 - through]
+            }
+            (Blend::Maximum, Some(values)) => pixel(&values),
+            (Blend::Maximum, None) => [0.0; 4],
         }
     }
 

@@ -9,19 +9,39 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::PathBuf;
 
-/// Tell what a mesh holds, and what of it would be drawn
+/// Tell what a mesh holds, and what of it would be drawn; or which devices there are
 #[derive(Args)]
 pub(crate) struct Options {
     /// The mesh
-    #[arg(value_name = "MESH.vtu")]
-    mesh: PathBuf,
+    #[arg(value_name = "MESH.vtu", required_unless_present = "devices")]
+    mesh: Option<PathBuf>,
+    /// List the devices that `render --device` knows, by index
+    #[arg(long, conflicts_with = "mesh")]
+    devices: bool,
 }
 
 pub(crate) fn run(options: &Options) -> Result<()> {
-    let mesh = progress::during("reading", |p| halite::io::open(&options.mesh, p))?;
     let mut text = String::new();
-    describe(&mut text, &options.mesh.display().to_string(), &mesh)?;
+    if let Some(path) = &options.mesh {
+        let mesh = progress::during("reading", |p| halite::io::open(path, p))?;
+        describe(&mut text, &path.display().to_string(), &mesh)?;
+    } else {
+        list_devices(&mut text)?;
+    }
     output::print(&text)
+}
+
+fn list_devices(out: &mut String) -> Result<()> {
+    for d in halite::gpu::devices() {
+        writeln!(out, "{:>3}  {}  ({}, {})", d.index, d.name, d.kind, d.driver)?;
+        if !d.uuid.is_empty() {
+            writeln!(out, "     UUID {}", d.uuid)?;
+        }
+        if let Some(lacks) = d.lacks {
+            writeln!(out, "     not used: {lacks}")?;
+        }
+    }
+    Ok(writeln!(out, "cpu  {} threads", rayon::current_num_threads())?)
 }
 
 fn describe(out: &mut String, name: &str, mesh: &Mesh) -> Result<()> {

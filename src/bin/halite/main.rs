@@ -11,6 +11,7 @@ mod render;
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};
+use halite::gpu::DeviceChoice;
 use halite::render::Renderer;
 use std::process::ExitCode;
 
@@ -55,10 +56,11 @@ fn main() -> ExitCode {
 }
 
 fn run(cli: Cli) -> Result<()> {
-    let mut renderer = Renderer::new(cli.threads)?;
     match cli.command {
-        Command::Render(options) => render::run(&options, &mut renderer),
-        Command::Info(options) => renderer.install(|| info::run(&options)),
-        Command::Demo(options) => demo::run(&options, &mut renderer),
+        Command::Render(options) => render::run(&options, cli.threads),
+        Command::Info(options) => {
+            Renderer::with_device(cli.threads, DeviceChoice::Cpu)?.install(|| info::run(&options))
+        }
+        Command::Demo(options) => demo::run(&options, &mut Renderer::new(cli.threads)?),
     }
 }

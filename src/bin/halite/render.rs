@@ -2,6 +2,7 @@ use crate::{camera, choose, output, parse, progress};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use halite::field::{Association, Component, Field};
+use halite::gpu::DeviceChoice;
 use halite::image::{Backdrop, Image};
 use halite::mesh::{Mesh, cells, cells::Tetrahedra};
 use halite::render::{Renderer, Stats};
@@ -69,9 +70,9 @@ pub(crate) struct Options {
     /// How rays find their cells
     #[arg(long, help_heading = "Engine")]
     engine: Option<Engine>,
-    /// Where the work is done; HALITE_DEVICE overrides it
-    #[arg(long, help_heading = "Engine")]
-    device: Option<Device>,
+    /// Where the work is done: auto, cpu, or a device's index, UUID or part of its name; HALITE_DEVICE overrides auto
+    #[arg(long, value_name = "DEVICE", help_heading = "Engine")]
+    device: Option<String>,
     /// How a ray is integrated in a cell
     #[arg(long, help_heading = "Engine")]
     integral: Option<Integral>,
@@ -97,24 +98,28 @@ enum Engine {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum Device {
-    Auto,
-    Cpu,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
 enum Integral {
     Exact,
 }
 
-pub(crate) fn run(options: &Options, renderer: &mut Renderer) -> Result<()> {
+pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     output::check_picture(&options.out)?;
     if let Some(path) = &options.stats {
         output::check(path)?;
     }
-    let job = renderer.install(|| prepare(options))?;
+    let from_file = options.input.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+    let given = if from_file { Some(Scene::open(&options.input)?) } else { None };
+    check_engine(given.as_ref()).with_context(|| options.input.display().to_string())?;
+    let device = match (&options.device, given.as_ref().and_then(|scene| scene.device.as_ref())) {
+        (Some(name), _) => name.clone(),
+        (None, Some(serde_json::Value::String(name))) => name.clone(),
+        (None, Some(index)) => index.to_string(),
+        (None, None) => "auto".into(),
+    };
+    let mut renderer = Renderer::with_device(threads, DeviceChoice::parse(&device))?;
+    let job = renderer.install(|| prepare(options, given))?;
     let background = job.scene.background;
-    let drawn = draw(job, renderer)?;
+    let drawn = draw(job, &mut renderer)?;
     drawn.image.save(&options.out, backdrop(background, drawn.behind.as_deref()))?;
     if let Some(path) = &options.stats {
         let text = format!("{:#}\n", drawn.report());
@@ -133,12 +138,9 @@ pub(crate) struct Job {
     pub(crate) split_ms: f64,
 }
 
-fn prepare(options: &Options) -> Result<Job> {
+fn prepare(options: &Options, given: Option<Scene>) -> Result<Job> {
     let map = options.colormap.as_deref().map(color_map).transpose()?;
-    let from_file = options.input.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-    let given = if from_file { Some(Scene::open(&options.input)?) } else { None };
-    check_device(given.as_ref()).with_context(|| options.input.display().to_string())?;
-
+    let from_file = given.is_some();
     let start = Instant::now();
     let path = given.as_ref().map_or(options.input.clone(), |scene| scene.mesh.clone());
     let mesh = progress::during("reading", |p| halite::io::open(&path, p))?;
@@ -235,8 +237,8 @@ fn color_map(text: &str) -> Result<ColorMap> {
     Ok(if file.ends_with(".json") { ColorMap::open(Path::new(&file), preset)? } else { ColorMap::named(text)? })
 }
 
-/// Refuses what a scene, or the environment, asks for and Halite has not: what options ask for, clap has checked.
-fn check_device(scene: Option<&Scene>) -> Result<()> {
+/// Refuses what a scene asks for and Halite has not: what options ask for, clap has checked.
+fn check_engine(scene: Option<&Scene>) -> Result<()> {
     fn check<T: ValueEnum>(what: &str, name: &str) -> Result<()> {
         if T::from_str(name, true).is_err() {
             let known = T::value_variants().iter().filter_map(ValueEnum::to_possible_value);
@@ -245,17 +247,11 @@ fn check_device(scene: Option<&Scene>) -> Result<()> {
         }
         Ok(())
     }
-    if let Ok(name) = std::env::var("HALITE_DEVICE") {
-        check::<Device>("HALITE_DEVICE", &name)?;
-    }
     let Some(scene) = scene else { return Ok(()) };
     if let Some(name) = &scene.engine {
         check::<Engine>("engine", name)?;
     }
     let text = |v: &serde_json::Value| v.as_str().map_or_else(|| v.to_string(), str::to_owned);
-    if let Some(device) = &scene.device {
-        check::<Device>("device", &text(device))?;
-    }
     if let Some(integral) = &scene.integral {
         check::<Integral>("integral", &text(integral))?;
     }
@@ -309,7 +305,8 @@ impl Drawn {
             "load_ms": self.load_ms, "faces_ms": self.split_ms + s.faces_ms, "upload_ms": s.upload_ms,
             "first_frame_ms": self.first_frame_ms, "frame_ms": s.frame_ms, "transfer_edit_ms": null,
             "steps": s.steps, "repaired_rays": s.repaired_rays,
-            "device_bytes": s.device_bytes, "peak_bytes": peak_bytes(),
+            "device_ms": s.device_ms, "uploaded_bytes": s.uploaded_bytes, "device_bytes": s.device_bytes,
+            "peak_bytes": peak_bytes(),
         })
     }
 }

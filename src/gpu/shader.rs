@@ -1,0 +1,163 @@
+//! Shader assembly: fragments of WGSL joined into programs, after a prelude of what Rust knows.
+
+use super::Gpu;
+use crate::field::Kind;
+use crate::integral::{BUCKETS, DEEP, GAUSS_3, GAUSS_6, OPAQUE_EXTINCTION, PANEL, SHALLOW};
+use std::fmt::Write;
+
+pub(crate) const CELL: &str = include_str!("../../shaders/cell.wgsl");
+pub(crate) const INTEGRAL: &str = include_str!("../../shaders/integral.wgsl");
+
+/// What a program is compiled for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Variant {
+    /// The field's values.
+    pub(crate) kind: Kind,
+    /// Emission is not multiplied by extinction.
+    pub(crate) direct: bool,
+}
+
+/// An array of the mesh's size, as a shader sees it: `name(i)` is its element i.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Array {
+    pub(crate) name: &'static str,
+    pub(crate) element: &'static str,
+    /// Number of bindings that it is spread over, and the logarithm of the elements in each.
+    pub(crate) chunks: usize,
+    pub(crate) shift: u32,
+}
+
+/// Constants of the integral, and what differs between the kinds of fields.
+pub(crate) fn prelude(variant: &Variant) -> String {
+    let mut text = String::new();
+    let number = |x: f64| format!("{x:?}f");
+    let mut constant = |name: &str, value: String| text += &format!("const {name} = {value};\n");
+    for (name, value) in [("DEEP", DEEP), ("SHALLOW", SHALLOW), ("PANEL", PANEL), ("OPAQUE", OPAQUE_EXTINCTION)] {
+        constant(name, number(value));
+    }
+    // Four units in the last place, as in cell.rs; and what is as good as 0 but far above the smallest f32.
+    constant("DOUBT", number(4.0 * f64::from(f32::EPSILON)));
+    constant("TINY", number(1e-18));
+    constant("BUCKETS", format!("{BUCKETS}u"));
+    for (rule, nodes) in [("GAUSS_3", &GAUSS_3[..]), ("GAUSS_6", &GAUSS_6)] {
+        for (i, [node, weight]) in nodes.iter().enumerate() {
+            constant(&format!("{rule}_{i}"), format!("vec2f({node:?}, {weight:?})"));
+        }
+    }
+    constant("DIRECT", variant.direct.to_string());
+    constant("PAIR", (variant.kind == Kind::Pair).to_string());
+    constant("RGBA", (variant.kind == Kind::Rgba).to_string());
+    let [value, first, last, color, padded, least] = match variant.kind {
+        Kind::Scalar => ["f32", "v", "v", "vec3f(v)", "vec4f(0.0, 0.0, 0.0, v)", "abs(v) < 1e38"],
+        Kind::Pair => ["vec2f", "v.x", "v.y", "vec3f(v.x)", "vec4f(v.x, 0.0, 0.0, v.y)", "all(abs(v) < vec2f(1e38))"],
+        Kind::Rgba => ["vec4f", "v.x", "v.w", "v.xyz", "v", "all(abs(v) < vec4f(1e38))"],
+    };
+    text += &format!("alias Value = {value};\n");
+    for (name, result, body) in [
+        ("first_of", "f32", first),
+        ("last_of", "f32", last),
+        ("color_of", "vec3f", color),
+        ("padded", "vec4f", padded),
+        ("is_visible", "bool", least),
+    ] {
+        text += &format!("fn {name}(v: Value) -> {result} {{ return {body}; }}\n");
+    }
+    text
+}
+
+/// Bindings of `arrays` in group 1, and the functions that look elements up in them.
+pub(crate) fn accessors(arrays: &[Array]) -> String {
+    let (mut text, mut binding) = (String::new(), 0);
+    for Array { name, element, chunks, shift } in arrays {
+        for c in 0..*chunks {
+            let place = format!("@group(1) @binding({binding})");
+            text += &format!("{place} var<storage, read> {name}_{c}: array<{element}>;\n");
+            binding += 1;
+        }
+        text += &format!("fn {name}(i: u32) -> {element} {{\n");
+        if *chunks > 1 {
+            let mask = (1u64 << shift) - 1;
+            let _ = writeln!(text, "    switch i >> {shift}u {{");
+            for c in 1..*chunks {
+                let _ = writeln!(text, "        case {c}u: {{ return {name}_{c}[i & {mask}u]; }}");
+            }
+            text += &format!("        default: {{ return {name}_0[i & {mask}u]; }}\n    }}\n}}\n");
+        } else {
+            text += &format!("    return {name}_0[i];\n}}\n");
+        }
+    }
+    text
+}
+
+/// Compiles a program whose entry point is "main".
+pub(crate) fn compile(
+    gpu: &Gpu,
+    label: &str,
+    source: &str,
+    layouts: &[&wgpu::BindGroupLayout],
+) -> wgpu::ComputePipeline {
+    let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some(label),
+        source: wgpu::ShaderSource::Wgsl(source.into()),
+    });
+    let layouts: Vec<_> = layouts.iter().map(|l| Some(*l)).collect();
+    let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some(label),
+        bind_group_layouts: &layouts,
+        immediate_size: 0,
+    });
+    gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: Some(label),
+        layout: Some(&layout),
+        module: &module,
+        entry_point: Some("main"),
+        compilation_options: wgpu::PipelineCompilationOptions {
+            zero_initialize_workgroup_memory: false,
+            ..Default::default()
+        },
+        cache: None,
+    })
+}
+
+/// What one binding of a compute shader is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Binding {
+    Uniform,
+    Read,
+    Write,
+}
+
+/// The layout of a group whose bindings are numbered from 0.
+pub(crate) fn group_layout(gpu: &Gpu, bindings: &[Binding]) -> wgpu::BindGroupLayout {
+    let entries: Vec<_> = (0..)
+        .zip(bindings)
+        .map(|(binding, kind)| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::COMPUTE,
+            ty: wgpu::BindingType::Buffer {
+                ty: match kind {
+                    Binding::Uniform => wgpu::BufferBindingType::Uniform,
+                    Binding::Read => wgpu::BufferBindingType::Storage { read_only: true },
+                    Binding::Write => wgpu::BufferBindingType::Storage { read_only: false },
+                },
+                has_dynamic_offset: false,
+                min_binding_size: None,
+            },
+            count: None,
+        })
+        .collect();
+    gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &entries })
+}
+
+/// A group of whole buffers, bound from 0 on.
+pub(crate) fn group<'a>(
+    gpu: &Gpu,
+    layout: &wgpu::BindGroupLayout,
+    buffers: impl IntoIterator<Item = &'a super::buffers::Buffer>,
+) -> wgpu::BindGroup {
+    let entries: Vec<_> = (0..)
+        .zip(buffers)
+        .map(|(binding, b)| wgpu::BindGroupEntry { binding, resource: b.raw.as_entire_binding() })
+        .collect();
+    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries })
+}

@@ -1,0 +1,478 @@
+//! The walk on a GPU: what `shaders/traverse.wgsl` needs, handed over once and kept until it changes.
+
+use super::boundary::LEAF;
+use super::cpu::{Counts, NEGLIGIBLE};
+use super::{Cell, Geometry, Values};
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::gpu::buffers::{Buffer, Chunks};
+use crate::gpu::shader::{self, Array, Binding, Variant};
+use crate::integral::{Exact, Knots};
+use crate::mesh::faces::BOUNDARY;
+use crate::view::{Blend, Fan, View};
+use bytemuck::{Pod, Zeroable};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use wgpu::BufferUsages as Usage;
+
+const TRAVERSE: &str = include_str!("../../shaders/traverse.wgsl");
+
+/// Rays of one dispatch at most: a driver ends work that takes seconds.
+const RAYS: u64 = 1 << 21;
+
+/// Loop iterations of one ray that llvmpipe surely makes: an eighth of those that 8 rays may make together.
+const LLVMPIPE_WORK: u32 = 8000;
+
+/// Stands for ±∞ in limits of t, which are within ±10 else.
+const FAR: f32 = 1e30;
+
+/// Opacity of a pixel whose ray the device did not finish.
+const UNFINISHED: f32 = -2e30;
+
+/// Stands for a value that is not finite; the shader takes all above 1e38 for such.
+const INVISIBLE: f32 = 3e38;
+
+/// Added to the boxes of the hierarchy on all sides: above all rounding in their intersection with a ray, as eyes that
+/// rays start from are at most [`NEAR_EYE`] away.
+const MARGIN: f32 = 2e-6;
+
+/// How well, in normalised units, places along a ray are known when they come from f32 corners. Lengths that come from
+/// volumes are kept within this of them.
+const SHARP: f32 = 2e-6;
+
+/// Up to this distance from the mesh's centre, in normalised units, rays start at the eye.
+const NEAR_EYE: f64 = 2.0;
+
+/// How far aside, in normalised units, a lost ray is tried again.
+const ASIDE: f32 = 2e-7;
+
+/// `Frame` in the shader.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Frame {
+    origin: [[f32; 4]; 3],
+    direction: [[f32; 4]; 3],
+    size: [u32; 2],
+    first_row: u32,
+    rows: u32,
+    offset: [f32; 2],
+    near: f32,
+    far: f32,
+    planes: u32,
+    has_ends: u32,
+    leaves: u32,
+    faces: u32,
+    most_steps: u32,
+    most_work: u32,
+    padding: [u32; 2],
+}
+
+/// `Function` in the shader.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Function {
+    opacity: u32,
+    color: u32,
+    end: u32,
+    scale: f32,
+}
+
+/// `Knot` in the shader.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Knot {
+    value: [f32; 4],
+    slope: [f32; 4],
+    s: f32,
+    padding: [f32; 3],
+}
+
+/// `Outer` in the shader.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Outer {
+    points: [u32; 3],
+    cell: u32,
+}
+
+/// `Box` in the shader.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Bounds {
+    low: [f32; 4],
+    high: [f32; 4],
+}
+
+/// `Counts` in the shader.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct RawCounts {
+    steps: u32,
+    carry: u32,
+    repaired: u32,
+    unused: u32,
+}
+
+/// What a frame depends on, apart from the view: each part is handed over again only after it was forgotten.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Part {
+    /// Cells and all that follows from them.
+    Mesh,
+    /// Where the points are.
+    Points,
+    /// The field's values.
+    Field,
+    /// The transfer function.
+    Function,
+}
+
+/// A frame as the device drew it.
+pub(crate) struct Drawn {
+    /// Premultiplied colours; for [`Blend::Maximum`] the largest values instead.
+    pub(crate) pixels: Vec<[f32; 4]>,
+    pub(crate) counts: Counts,
+    /// What the device itself says that the frame took, in ms.
+    pub(crate) device_ms: Option<f64>,
+}
+
+/// A device, and what of the mesh, field and function it holds.
+#[derive(Debug)]
+pub(crate) struct Traverse {
+    gpu: Gpu,
+    layout: wgpu::BindGroupLayout,
+    cells: Option<[Chunks; 2]>,
+    points: Option<[Chunks; 3]>,
+    values: Option<Chunks>,
+    function: Option<[Buffer; 3]>,
+    program: Option<(String, wgpu::ComputePipeline, wgpu::BindGroupLayout)>,
+}
+
+impl Traverse {
+    pub(crate) fn new(gpu: Gpu) -> Self {
+        use Binding::{Read, Uniform, Write};
+        let layout = shader::group_layout(&gpu, &[Uniform, Read, Read, Uniform, Read, Read, Write, Write]);
+        Traverse { gpu, layout, cells: None, points: None, values: None, function: None, program: None }
+    }
+
+    pub(crate) fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    /// Takes `part` for changed.
+    pub(crate) fn forget(&mut self, part: Part) {
+        match part {
+            Part::Mesh => (self.cells, self.points, self.values) = (None, None, None),
+            Part::Points => self.points = None,
+            Part::Field => self.values = None,
+            Part::Function => self.function = None,
+        }
+    }
+
+    /// Hands over what the device does not hold yet.
+    ///
+    /// # Errors
+    /// Those of [`Gpu::check`] and [`Buffer::new`].
+    pub(crate) fn upload<const N: usize>(
+        &mut self,
+        geometry: &Geometry,
+        values: &Values<N>,
+        exact: &Exact<f32>,
+    ) -> Result<()> {
+        let gpu = &self.gpu;
+        if self.cells.is_none() {
+            let cells = Chunks::new(gpu, "cells", &geometry.cells, |c| *c)?;
+            let outer = |f: &super::boundary::BoundaryFace| Outer { points: f.points, cell: f.cell };
+            self.cells = Some([cells, Chunks::new(gpu, "faces", &geometry.boundary.faces, outer)?]);
+        }
+        if self.points.is_none() {
+            let points = Chunks::new(gpu, "points", &geometry.points, |p| p.as_vec3().to_array())?;
+            let volume = |c: &Cell| six_volumes(c.corners.map(|p| geometry.points[p as usize]));
+            let volumes = Chunks::new(gpu, "volumes", &geometry.cells, volume)?;
+            let boxes = Chunks::new(gpu, "boxes", geometry.boundary.boxes(), outward)?;
+            self.points = Some([points, volumes, boxes]);
+        }
+        if self.values.is_none() {
+            let all = match values {
+                Values::Point(v) | Values::Cell(v) => v.as_slice(),
+                Values::Corner(v) => v.as_flattened(),
+            };
+            let finite = |v: &[f32; N]| v.map(|v| if v.is_finite() { v } else { INVISIBLE });
+            self.values = Some(Chunks::new(gpu, "values", all, finite)?);
+        }
+        if self.function.is_none() {
+            self.function = Some(upload_function(gpu, exact)?);
+        }
+        Ok(())
+    }
+
+    /// Draws a frame.
+    ///
+    /// # Errors
+    /// Those of [`Gpu::check`] and [`Buffer::new`].
+    pub(crate) fn render<const N: usize>(
+        &mut self,
+        geometry: &Geometry,
+        values: &Values<N>,
+        exact: &Exact<f32>,
+        view: &View,
+    ) -> Result<Drawn> {
+        self.upload(geometry, values, exact)?;
+        let association = match values {
+            Values::Point(_) => "POINT",
+            Values::Corner(_) => "CORNER",
+            Values::Cell(_) => "CELL",
+        };
+        let arrays = self.arrays::<N>()?;
+        let variant = Variant { kind: exact.kind, direct: exact.direct };
+        let source = program(&variant, association, view.blend(), &arrays);
+        if self.program.as_ref().is_none_or(|p| p.0 != source) {
+            let bindings = arrays.iter().map(|a| a.chunks).sum();
+            let layout = shader::group_layout(&self.gpu, &vec![Binding::Read; bindings]);
+            let pipeline = shader::compile(&self.gpu, "traverse", &source, &[&self.layout, &layout]);
+            self.gpu.check()?;
+            self.program = Some((source, pipeline, layout));
+        }
+        self.draw(geometry, view)
+    }
+
+    /// The pixels whose rays the device did not finish, as indices.
+    pub(crate) fn unfinished(pixels: &[[f32; 4]]) -> Vec<usize> {
+        pixels.par_iter().enumerate().filter(|(_, p)| p[3] == UNFINISHED).map(|(i, _)| i).collect()
+    }
+
+    /// The largest values along the ray of a pixel drawn with [`Blend::Maximum`]; none if it met nothing.
+    pub(crate) fn largest<const N: usize>(pixel: &[f32; 4]) -> Option<[f32; N]> {
+        // The first values come first, the last one last.
+        let values = std::array::from_fn(|k| pixel[if k + 1 == N { 3 } else { k }]);
+        (pixel[3] > -FAR).then_some(values)
+    }
+
+    /// The arrays of group 1, in the order of [`Self::chunks`].
+    fn arrays<const N: usize>(&self) -> Result<[Array; 6]> {
+        let names = [
+            ("cells", "Cell"),
+            ("faces", "Outer"),
+            ("points", "Point"),
+            ("volumes", "f32"),
+            ("boxes", "Box"),
+            ("values", "Value"),
+        ];
+        let chunks = self.chunks()?;
+        Ok(std::array::from_fn(|i| {
+            let (name, element) = names[i];
+            Array { name, element, chunks: chunks[i].buffers.len(), shift: chunks[i].shift }
+        }))
+    }
+
+    fn chunks(&self) -> Result<[&Chunks; 6]> {
+        match (&self.cells, &self.points, &self.values) {
+            (Some([cells, faces]), Some([points, volumes, boxes]), Some(values)) => {
+                Ok([cells, faces, points, volumes, boxes, values])
+            }
+            _ => Err(Error::Render("the device does not hold the mesh".into())),
+        }
+    }
+
+    fn draw(&self, geometry: &Geometry, view: &View) -> Result<Drawn> {
+        let gpu = &self.gpu;
+        let (Some(function), Some((_, pipeline, group_layout))) = (&self.function, &self.program) else {
+            return Err(Error::Render("the device does not hold the transfer function".into()));
+        };
+        let [w, h] = view.size();
+        let fan = view.fan(geometry.centre, geometry.scale, NEAR_EYE);
+        let planes: Vec<[f32; 4]> = view
+            .clipping_planes()
+            .iter()
+            .map(|p| {
+                let normal = (p.normal / p.normal.abs().max_element()).normalize();
+                let offset = normal.dot((geometry.centre - p.origin) * geometry.scale);
+                normal.extend(offset).as_vec4().to_array()
+            })
+            .collect();
+        let ends = ends(view, &fan, geometry.scale);
+        let frame = Frame {
+            origin: fan.origin.map(|v| v.as_vec3().extend(0.0).to_array()),
+            direction: fan.direction.map(|v| v.as_vec3().extend(0.0).to_array()),
+            size: [w, h],
+            first_row: 0,
+            rows: 0,
+            offset: fan.offset.as_vec2().to_array(),
+            near: (fan.near as f32).clamp(-FAR, FAR),
+            far: (fan.far as f32).clamp(-FAR, FAR),
+            planes: planes.len() as u32,
+            has_ends: u32::from(!ends.is_empty()),
+            leaves: geometry.boundary.boxes().len().div_ceil(2) as u32,
+            faces: geometry.boundary.faces.len() as u32,
+            most_steps: geometry.cells.len() as u32,
+            most_work: if gpu.adapter.kind == "CPU" { LLVMPIPE_WORK } else { u32::MAX },
+            padding: [0; 2],
+        };
+        let rows = (RAYS / u64::from(w)).clamp(1, u64::from(h)) as u32;
+        let size = u64::from(w) * u64::from(rows) * 16;
+        let frame_buffer = Buffer::new(gpu, "frame", size_of::<Frame>() as u64, Usage::UNIFORM | Usage::COPY_DST)?;
+        let planes = Buffer::holding(gpu, "planes", &planes, Usage::STORAGE)?;
+        let ends = Buffer::holding(gpu, "ends", &ends, Usage::STORAGE)?;
+        let pixels = Buffer::new(gpu, "pixels", size, Usage::STORAGE | Usage::COPY_SRC)?;
+        let counts = Buffer::new(gpu, "counts", 16, Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST)?;
+        let back = Buffer::new(gpu, "readback", size + 32, Usage::COPY_DST | Usage::MAP_READ)?;
+        let [parameters, knots, buckets] = function;
+        let own = [parameters, knots, buckets, &frame_buffer, &planes, &ends, &pixels, &counts];
+        let own = shader::group(gpu, &self.layout, own);
+        let shared = shader::group(gpu, group_layout, self.chunks()?.into_iter().flat_map(|c| &c.buffers));
+        let clock = Clock::new(gpu)?;
+
+        let mut drawn =
+            Drawn { pixels: Vec::with_capacity(w as usize * h as usize), counts: Counts::default(), device_ms: None };
+        for first_row in (0..h).step_by(rows as usize) {
+            let rows = rows.min(h - first_row);
+            frame_buffer.write(gpu, 0, bytemuck::bytes_of(&Frame { first_row, rows, ..frame }));
+            let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            encoder.clear_buffer(&counts.raw, 0, None);
+            {
+                let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                    label: Some("traverse"),
+                    timestamp_writes: clock.as_ref().map(Clock::writes),
+                });
+                pass.set_pipeline(pipeline);
+                pass.set_bind_group(0, &own, &[]);
+                pass.set_bind_group(1, &shared, &[]);
+                pass.dispatch_workgroups(w.div_ceil(8), rows.div_ceil(8), 1);
+            }
+            encoder.copy_buffer_to_buffer(&pixels.raw, 0, &back.raw, 0, size);
+            encoder.copy_buffer_to_buffer(&counts.raw, 0, &back.raw, size, 16);
+            if let Some(clock) = &clock {
+                clock.resolve(&mut encoder, &back, size + 16);
+            }
+            let mapped = Arc::new(AtomicBool::new(false));
+            let done = Arc::clone(&mapped);
+            encoder.map_buffer_on_submit(&back.raw, wgpu::MapMode::Read, .., move |r| done.store(r.is_ok(), Relaxed));
+            gpu.queue.submit([encoder.finish()]);
+            gpu.wait()?;
+            if !mapped.load(Relaxed) {
+                return Err(Error::Lost(format!("{} does not hand its pixels back", gpu.adapter.name)));
+            }
+            {
+                let failed = |e| Error::Lost(format!("{} does not hand its pixels back: {e}", gpu.adapter.name));
+                let bytes = back.raw.get_mapped_range(..).map_err(failed)?;
+                let (image, rest) = bytes.split_at(size as usize);
+                drawn.pixels.extend_from_slice(&bytemuck::cast_slice(image)[..w as usize * rows as usize]);
+                let c: RawCounts = bytemuck::pod_read_unaligned(&rest[..16]);
+                drawn.counts.steps += u64::from(c.carry) << 32 | u64::from(c.steps);
+                drawn.counts.repaired += u64::from(c.repaired);
+                if clock.is_some() {
+                    let [start, end]: [u64; 2] = bytemuck::pod_read_unaligned(&rest[16..32]);
+                    let ms = end.saturating_sub(start) as f64 * f64::from(gpu.queue.get_timestamp_period()) / 1e6;
+                    drawn.device_ms = Some(drawn.device_ms.unwrap_or(0.0) + ms);
+                }
+            }
+            back.raw.unmap();
+        }
+        Ok(drawn)
+    }
+}
+
+/// Measures a pass, where the device can.
+struct Clock {
+    queries: wgpu::QuerySet,
+    resolved: Buffer,
+}
+
+impl Clock {
+    fn new(gpu: &Gpu) -> Result<Option<Self>> {
+        if !gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
+            return Ok(None);
+        }
+        let descriptor = wgpu::QuerySetDescriptor { label: None, ty: wgpu::QueryType::Timestamp, count: 2 };
+        let queries = gpu.device.create_query_set(&descriptor);
+        Ok(Some(Clock { queries, resolved: Buffer::new(gpu, "clock", 16, Usage::QUERY_RESOLVE | Usage::COPY_SRC)? }))
+    }
+
+    fn writes(&self) -> wgpu::ComputePassTimestampWrites<'_> {
+        wgpu::ComputePassTimestampWrites {
+            query_set: &self.queries,
+            beginning_of_pass_write_index: Some(0),
+            end_of_pass_write_index: Some(1),
+        }
+    }
+
+    fn resolve(&self, encoder: &mut wgpu::CommandEncoder, into: &Buffer, offset: u64) {
+        encoder.resolve_query_set(&self.queries, 0..2, &self.resolved.raw, 0);
+        encoder.copy_buffer_to_buffer(&self.resolved.raw, 0, &into.raw, offset, 16);
+    }
+}
+
+/// The whole program.
+fn program(variant: &Variant, association: &str, blend: Blend, arrays: &[Array]) -> String {
+    let mut text = shader::prelude(variant);
+    for (name, value) in [
+        ("FAR", f64::from(FAR)),
+        ("UNFINISHED", f64::from(UNFINISHED)),
+        ("INVISIBLE", f64::from(INVISIBLE)),
+        ("SHARP", f64::from(SHARP)),
+        ("SLACK", f64::from(MARGIN)),
+        ("ASIDE", f64::from(ASIDE)),
+        ("NEGLIGIBLE", f64::from(NEGLIGIBLE)),
+    ] {
+        text += &format!("const {name} = {value:?}f;\n");
+    }
+    text +=
+        &format!("const NONE = {BOUNDARY}u;\nconst LEAF = {LEAF}u;\nconst MAXIMUM = {};\n", blend == Blend::Maximum);
+    text += "const POINT = 0u;\nconst CORNER = 1u;\nconst CELL = 2u;\n";
+    text += &format!("const ASSOCIATION = {association};\nstruct Point {{ x: f32, y: f32, z: f32 }}\n");
+    text += &shader::accessors(arrays);
+    [&text, shader::CELL, shader::INTEGRAL, TRAVERSE].join("\n")
+}
+
+/// `Function`, its knots and its buckets.
+fn upload_function(gpu: &Gpu, exact: &Exact<f32>) -> Result<[Buffer; 3]> {
+    let functions: Vec<&Knots<f32>> = [Some(&exact.opacity), exact.color.as_ref()].into_iter().flatten().collect();
+    let (mut knots, mut buckets) = (Vec::<Knot>::new(), Vec::<u32>::new());
+    for f in functions {
+        buckets.extend(f.bucket.iter().map(|b| b + knots.len() as u32));
+        let knot = |i: usize| Knot { value: f.value[i], slope: f.slope[i], s: f.s[i], padding: [0.0; 3] };
+        knots.extend((0..f.len()).map(knot));
+    }
+    let end = knots.len() as u32;
+    let function = Function { opacity: 0, color: exact.opacity.len() as u32, end, scale: exact.scale };
+    Ok([
+        Buffer::holding(gpu, "function", &[function], Usage::UNIFORM)?,
+        Buffer::holding(gpu, "knots", &knots, Usage::STORAGE)?,
+        Buffer::holding(gpu, "buckets", &buckets, Usage::STORAGE)?,
+    ])
+}
+
+/// Where a depth buffer ends each pixel's ray, as the shader counts t; empty without one.
+fn ends(view: &View, fan: &Fan, scale: f64) -> Vec<f32> {
+    if !view.has_depth() {
+        return vec![];
+    }
+    let [w, h] = view.size();
+    let pixels = 0..w as usize * h as usize;
+    let end = |p: usize| {
+        let ray = view.ray((p % w as usize) as u32, (p / w as usize) as u32);
+        let start = fan.ahead / ray.direction.dot(fan.direction[0]);
+        ((ray.t_max * scale - start) as f32).clamp(-FAR, FAR)
+    };
+    pixels.into_par_iter().map(end).collect()
+}
+
+/// Six times the volume of a tetrahedron.
+fn six_volumes([a, b, c, d]: [DVec3; 4]) -> f32 {
+    (b - a).cross(c - a).dot(d - a).abs() as f32
+}
+
+/// A box in f32 that holds one in f64 with a margin.
+fn outward([low, high]: &[DVec3; 2]) -> Bounds {
+    if low.x > high.x {
+        return Bounds { low: [1.0; 4], high: [-1.0; 4] };
+    }
+    Bounds {
+        low: (low.as_vec3() - MARGIN).extend(0.0).to_array(),
+        high: (high.as_vec3() + MARGIN).extend(0.0).to_array(),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,586 @@
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr, reason = "tests")]
+
+use super::*;
+use crate::cell::{Face, Projected};
+use crate::field::{Association, Component, Field, Kind, Normal};
+use crate::gpu::DeviceChoice;
+use crate::image::Image;
+use crate::integral::Light;
+use crate::mesh::cells::Tetrahedra;
+use crate::mesh::{Array as MeshArray, Mesh, Values as MeshValues, generate};
+use crate::render::Renderer;
+use crate::transfer::{Convention, Emission, TransferFunction};
+use crate::view::{Camera, ClippingPlane, DepthBuffer, DepthKind, Projection};
+use wgpu::naga;
+
+/// The device to test: `HALITE_TEST_DEVICE`, or the first. Without any, tests are skipped, loudly; with
+/// `HALITE_REQUIRE_GPU=1` they fail.
+fn choice() -> Option<DeviceChoice> {
+    let name = std::env::var("HALITE_TEST_DEVICE").unwrap_or_else(|_| "0".into());
+    let choice = DeviceChoice::Named(name);
+    match Gpu::open(&choice) {
+        Ok(_) => Some(choice),
+        Err(e) if std::env::var("HALITE_REQUIRE_GPU").is_ok_and(|v| v == "1") => panic!("{e}"),
+        Err(e) => {
+            eprintln!("SKIPPED, as there is no GPU to test: {e}");
+            None
+        }
+    }
+}
+
+fn gpu() -> Option<Gpu> {
+    Gpu::open(&choice()?).unwrap()
+}
+
+/// Marsaglia's xorshift64 (2003).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0
+    }
+
+    fn unit(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn within(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.unit()
+    }
+
+    fn below(&mut self, n: usize) -> usize {
+        (self.next() >> 33) as usize % n
+    }
+
+    fn direction(&mut self) -> DVec3 {
+        loop {
+            let v = DVec3::from([(); 3].map(|()| self.within(-1.0, 1.0)));
+            if v.length() > 0.1 && v.length() < 1.0 {
+                return v.normalize();
+            }
+        }
+    }
+}
+
+const KINDS: [Kind; 3] = [Kind::Scalar, Kind::Pair, Kind::Rgba];
+
+fn arrays(chunks: usize) -> Vec<Array> {
+    let names = [
+        ("cells", "Cell"),
+        ("faces", "Outer"),
+        ("points", "Point"),
+        ("volumes", "f32"),
+        ("boxes", "Box"),
+        ("values", "Value"),
+    ];
+    names.map(|(name, element)| Array { name, element, chunks, shift: 22 }).to_vec()
+}
+
+fn validated(source: &str) -> naga::Module {
+    let module = match naga::front::wgsl::parse_str(source) {
+        Ok(module) => module,
+        Err(e) => panic!("{}", e.emit_to_string(source)),
+    };
+    let flags = naga::valid::ValidationFlags::all();
+    match naga::valid::Validator::new(flags, naga::valid::Capabilities::empty()).validate(&module) {
+        Ok(_) => module,
+        Err(e) => panic!("{}", e.emit_to_string(source)),
+    }
+}
+
+#[test]
+fn every_program_is_valid() {
+    for kind in KINDS {
+        for (direct, chunks) in [(false, 1), (true, 3)] {
+            for association in ["POINT", "CORNER", "CELL"] {
+                for blend in [Blend::Composite, Blend::Maximum] {
+                    validated(&program(&Variant { kind, direct }, association, blend, &arrays(chunks)));
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn layouts_match_their_rust_twins() {
+    use std::mem::offset_of;
+    let variant = Variant { kind: Kind::Scalar, direct: false };
+    let module = validated(&program(&variant, "POINT", Blend::Composite, &arrays(1)));
+    let check = |name: &str, size: usize, offsets: &[usize]| {
+        let (_, t) = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name)).unwrap();
+        let naga::TypeInner::Struct { members, span } = &t.inner else { panic!("{name} is no struct") };
+        let found: Vec<usize> = members.iter().map(|m| m.offset as usize).collect();
+        assert_eq!((*span as usize, &found[..]), (size, offsets), "{name}");
+    };
+    macro_rules! check {
+        ($name:literal, $rust:ty, $($field:ident)*) => {
+            check($name, size_of::<$rust>(), &[$(offset_of!($rust, $field)),*])
+        };
+    }
+    check!("Cell", Cell, corners neighbours);
+    check!("Outer", Outer, points cell);
+    check!("Box", Bounds, low high);
+    check!("Knot", Knot, value slope s);
+    check!("Function", Function, opacity color end scale);
+    check!("Counts", RawCounts, steps carry repaired unused);
+    check!("Frame", Frame, origin direction size first_row rows offset near far planes has_ends leaves faces most_steps most_work);
+    check("Point", 12, &[0, 4, 8]);
+}
+
+/// Runs a kernel over `cases`, whose bindings are 0 and, for as many results, 1 of group 1.
+fn run<C: Pod, R: Pod>(gpu: &Gpu, source: &str, group_0: &[(Binding, &Buffer)], cases: &[C]) -> Vec<R> {
+    let layouts = [
+        shader::group_layout(gpu, &group_0.iter().map(|g| g.0).collect::<Vec<_>>()),
+        shader::group_layout(gpu, &[Binding::Read, Binding::Write]),
+    ];
+    let pipeline = shader::compile(gpu, "test", source, &[&layouts[0], &layouts[1]]);
+    let size = (cases.len() * size_of::<R>()) as u64;
+    let cases_buffer = Buffer::holding(gpu, "cases", cases, Usage::STORAGE).unwrap();
+    let results = Buffer::new(gpu, "results", size, Usage::STORAGE | Usage::COPY_SRC).unwrap();
+    let back = Buffer::new(gpu, "back", size, Usage::COPY_DST | Usage::MAP_READ).unwrap();
+    let groups = [
+        shader::group(gpu, &layouts[0], group_0.iter().map(|g| g.1)),
+        shader::group(gpu, &layouts[1], [&cases_buffer, &results]),
+    ];
+    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    {
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+        pass.set_pipeline(&pipeline);
+        pass.set_bind_group(0, &groups[0], &[]);
+        pass.set_bind_group(1, &groups[1], &[]);
+        pass.dispatch_workgroups((cases.len() as u32).div_ceil(64), 1, 1);
+    }
+    encoder.copy_buffer_to_buffer(&results.raw, 0, &back.raw, 0, size);
+    encoder.map_buffer_on_submit(&back.raw, wgpu::MapMode::Read, .., |r| r.unwrap());
+    gpu.queue.submit([encoder.finish()]);
+    gpu.wait().unwrap();
+    let bytes = back.raw.get_mapped_range(..).unwrap();
+    bytemuck::cast_slice(&bytes[..]).to_vec()
+}
+
+const CELL_TEST: &str = "
+struct Case { points: array<vec4f, 4> }
+struct Outcome { areas: vec4f, next: vec4f, entered: u32, dropped: u32 }
+@group(1) @binding(0) var<storage, read> cases: array<Case>;
+@group(1) @binding(1) var<storage, read_write> outcomes: array<Outcome>;
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= arrayLength(&cases) { return; }
+    let a = cases[id.x].points[0].xyz;
+    let b = cases[id.x].points[1].xyz;
+    let c = cases[id.x].points[2].xyz;
+    let areas = areas_of(a, b, c);
+    let stepped = step(Face(a, b, c, areas), cases[id.x].points[3].xyz);
+    outcomes[id.x] = Outcome(vec4f(areas, 0.0), vec4f(stepped.areas, 0.0), u32(holds(a, b, c, areas)), stepped.dropped);
+}";
+
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Outcome {
+    areas: [f32; 4],
+    next: [f32; 4],
+    entered: u32,
+    dropped: u32,
+    padding: [u32; 2],
+}
+
+#[test]
+fn cells_are_walked_as_in_f64() {
+    let Some(gpu) = gpu() else { return };
+    let mut random = Random(3);
+    let cases: Vec<[[f32; 4]; 4]> = (0..200_000)
+        .map(|i| {
+            let span = [1.0, 3.0, 1000.0][i % 3];
+            let mut points = [(); 4].map(|()| {
+                let mut coordinate = || match (i / 3) % 3 {
+                    // Small integers make ties common; tiny and great numbers meet; anything.
+                    0 => random.within(-span - 0.5, span + 0.5).round() as f32,
+                    1 => (random.within(-1.0, 1.0) * 10f64.powf(random.within(-14.0, 0.0))) as f32,
+                    _ => random.within(-1.0, 1.0) as f32,
+                };
+                [coordinate(), coordinate(), coordinate(), 0.0]
+            });
+            // Nearly or wholly on one line with the origin.
+            if random.below(3) == 0 {
+                let f = random.within(-2.0, 2.0) as f32;
+                let to = random.below(4);
+                points[to] = points[(to + 1) % 4].map(|x| x * f);
+            }
+            points
+        })
+        .collect();
+    let variant = Variant { kind: Kind::Scalar, direct: false };
+    let source = [&shader::prelude(&variant), shader::CELL, CELL_TEST].join("\n");
+    let outcomes: Vec<Outcome> = run(&gpu, &source, &[], &cases);
+    let mut entered = 0;
+    for (case, outcome) in cases.iter().zip(&outcomes) {
+        let [a, b, c, d] = case.map(|p| Projected { x: f64::from(p[0]), y: f64::from(p[1]), t: f64::from(p[2]) });
+        let face = Face::enter([a, b, c]);
+        assert_eq!(face.is_some(), outcome.entered == 1, "{case:?}");
+        let Some(mut face) = face else { continue };
+        entered += 1;
+        let size = [a, b, c, d].iter().fold(0.0, |m: f64, p| m.max(p.x.abs()).max(p.y.abs()));
+        let near =
+            |got: [f32; 4], want: [f64; 3]| (0..3).all(|k| (f64::from(got[k]) - want[k]).abs() <= 3e-7 * size * size);
+        assert!(near(outcome.areas, face.areas), "{case:?}");
+        assert_eq!(face.step(d) as u32, outcome.dropped, "{case:?}");
+        assert!(near(outcome.next, face.areas), "{case:?}");
+    }
+    assert!(entered > 10_000);
+}
+
+const INTEGRAL_TEST: &str = "
+fn most_work() -> u32 { return 0xffffffffu; }
+struct Case { front: vec4f, back: vec4f, length: vec4f }
+@group(1) @binding(0) var<storage, read> cases: array<Case>;
+@group(1) @binding(1) var<storage, read_write> outcomes: array<vec4f>;
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= arrayLength(&cases) { return; }
+    light = vec4f(0.0, 0.0, 0.0, 1.0);
+    add_segment(value_of(cases[id.x].front), value_of(cases[id.x].back), cases[id.x].length.x);
+    outcomes[id.x] = light;
+}";
+
+#[test]
+fn segments_are_integrated_as_in_f64() {
+    let Some(gpu) = gpu() else { return };
+    let mut random = Random(5);
+    for (round, kind) in KINDS.into_iter().chain(KINDS).enumerate() {
+        let transfer = random_transfer(&mut random, round % 2 == 1);
+        let normal = [Normal { mid: 0.0, half: 1.0 }; 4];
+        let (fast, slow) =
+            (Exact::<f32>::new(&transfer, kind, &normal, 1.0), Exact::<f64>::new(&transfer, kind, &normal, 1.0));
+        let places: Vec<f32> = fast.opacity.s.clone();
+        let cases: Vec<[[f32; 4]; 3]> = (0..40_000)
+            .map(|i| {
+                let mut value = || match i % 4 {
+                    0 => places[random.below(places.len())].clamp(-1.0, 1.0),
+                    1 => 1e-4 * random.within(-1.0, 1.0) as f32,
+                    _ => random.within(-1.0, 1.0) as f32,
+                };
+                let (front, mut back) = ([(); 4].map(|()| value()), [(); 4].map(|()| value()));
+                if i % 7 == 0 {
+                    back = front;
+                }
+                let rgb = |v: [f32; 4]| if kind == Kind::Rgba { [v[0].abs(), v[1].abs(), v[2].abs(), v[3]] } else { v };
+                let length =
+                    [0.0, 1e-7, 1.0][i % 3] * random.unit() as f32 + 10f64.powf(random.within(-9.0, 1.0)) as f32;
+                [rgb(front), rgb(back), [length; 4]]
+            })
+            .collect();
+        let value = match kind {
+            Kind::Scalar => "v.x",
+            Kind::Pair => "v.xy",
+            Kind::Rgba => "v",
+        };
+        let variant = Variant { kind, direct: fast.direct };
+        let convert = format!("fn value_of(v: vec4f) -> Value {{ return {value}; }}");
+        let source = [&shader::prelude(&variant), &convert, shader::INTEGRAL, INTEGRAL_TEST].join("\n");
+        let [function, knots, buckets] = upload_function(&gpu, &fast).unwrap();
+        let group = [(Binding::Uniform, &function), (Binding::Read, &knots), (Binding::Read, &buckets)];
+        let outcomes: Vec<[f32; 4]> = run(&gpu, &source, &group, &cases);
+        for ([front, back, length], got) in cases.iter().zip(&outcomes) {
+            let want = add(&slow, kind, front, back, length[0]);
+            let twin = add_fast(&fast, kind, front, back, length[0]);
+            for k in 0..4 {
+                let (got, want) = (f64::from(got[k]), want[k]);
+                // Where an end rounds across a step of the function, f32 itself differs from f64.
+                let tolerance = 4e-6 * want.abs().max(1.0) + 2.0 * (f64::from(twin[k]) - want).abs();
+                assert!((got - want).abs() <= tolerance, "{kind:?} {front:?} {back:?} {length:?}: {got}, not {want}");
+            }
+        }
+    }
+}
+
+fn add(exact: &Exact<f64>, kind: Kind, front: &[f32; 4], back: &[f32; 4], length: f32) -> [f64; 4] {
+    let mut light = Light::none();
+    let (f, b, l) = (front.map(f64::from), back.map(f64::from), f64::from(length));
+    match kind {
+        Kind::Scalar => exact.add(&[f[0]], &[b[0]], l, &mut light),
+        Kind::Pair => exact.add(&[f[0], f[1]], &[b[0], b[1]], l, &mut light),
+        Kind::Rgba => exact.add(&f, &b, l, &mut light),
+    }
+    [light.color[0], light.color[1], light.color[2], light.through]
+}
+
+fn add_fast(exact: &Exact<f32>, kind: Kind, f: &[f32; 4], b: &[f32; 4], length: f32) -> [f32; 4] {
+    let mut light = Light::none();
+    match kind {
+        Kind::Scalar => exact.add(&[f[0]], &[b[0]], length, &mut light),
+        Kind::Pair => exact.add(&[f[0], f[1]], &[b[0], b[1]], length, &mut light),
+        Kind::Rgba => exact.add(f, b, length, &mut light),
+    }
+    [light.color[0], light.color[1], light.color[2], light.through]
+}
+
+fn random_transfer(random: &mut Random, direct: bool) -> TransferFunction {
+    let mut places = |n: usize| {
+        let mut places: Vec<f64> = (0..n).map(|_| random.within(-1.1, 1.1)).collect();
+        places.sort_by(f64::total_cmp);
+        places
+    };
+    let (colors, opacities) = (places(5), places(6));
+    let color = colors.into_iter().map(|s| (s, [random.unit(), random.unit(), random.unit()])).collect();
+    let mut opacity: Vec<_> = opacities.into_iter().map(|s| (s, (random.unit() * 1.5 - 0.5).max(0.0))).collect();
+    // A step.
+    opacity[3].0 = opacity[2].0;
+    let convention = if random.below(2) == 0 { Convention::Extinction } else { Convention::Opacity };
+    let emission = if direct { Emission::Direct { scale: random.within(0.2, 2.0) } } else { Emission::Chromatic };
+    let distance = 10f64.powf(random.within(-1.5, 0.3));
+    TransferFunction::new(color, opacity, distance)
+        .unwrap()
+        .with_convention(convention)
+        .with_clamp(random.below(4) > 0)
+        .with_emission(emission)
+        .unwrap()
+}
+
+fn random_view(random: &mut Random, size: [u32; 2]) -> View {
+    let focal_point = random.direction() * 0.3;
+    let distance = [0.2, 1.5, 4.0, 6.0, 40.0][random.below(5)];
+    let mut away = random.direction();
+    if random.below(4) == 0 {
+        // Along an axis, so that faces are seen edge-on.
+        away = [DVec3::X, DVec3::NEG_Y, DVec3::Z][random.below(3)];
+    }
+    let projection = if random.below(3) == 0 {
+        Projection::Parallel { parallel_scale: random.within(0.5, 2.0) }
+    } else {
+        let fit = 2.0 * (1.8f64 / distance).atan().to_degrees();
+        Projection::Perspective { view_angle: fit.min(random.within(60.0, 110.0)) }
+    };
+    let camera =
+        Camera { position: focal_point + away * distance, focal_point, view_up: random.direction(), projection };
+    let mut view = View::new(camera, size).unwrap();
+    if random.below(4) == 0 {
+        view = view.with_clipping_range([distance * 0.8, distance * 1.1]).unwrap();
+    }
+    if random.below(4) == 0 {
+        let plane = ClippingPlane { origin: random.direction() * 0.4, normal: random.direction() * 3.0 };
+        view = view.with_clipping_planes(vec![plane]).unwrap();
+    }
+    if random.below(4) == 0 {
+        let pixels = size[0] as usize * size[1] as usize;
+        let values = (0..pixels).map(|_| distance + random.within(-0.5, 1.0)).collect();
+        let kind = [DepthKind::Eye, DepthKind::Ray][random.below(2)];
+        view = view.with_depth(DepthBuffer { kind, values }).unwrap();
+    }
+    view
+}
+
+/// `mesh` with arrays "scalar", "pair" and "rgba" at its points and cells; `change` may change the i-th value at points.
+fn with_arrays(mesh: Mesh, change: impl Fn(usize, usize, f64) -> f64) -> Mesh {
+    let fields = |p: DVec3| {
+        let (x, y, z) = (p.x, p.y, p.z);
+        [0.5 + 0.5 * (3.0 * x).sin(), 0.5 + 0.5 * (2.0 * y).cos(), 0.5 + 0.4 * z, (4.0 * x * y).sin()]
+    };
+    let array = |(name, n): (&str, usize), places: &[DVec3], change: &dyn Fn(usize, usize, f64) -> f64| {
+        let values = places.iter().flat_map(|&p| fields(p).into_iter().skip(4 - n));
+        let values = values.enumerate().map(|(i, v)| change(i, n, v)).collect();
+        MeshArray { name: name.into(), components: n, values: MeshValues::F64(values) }
+    };
+    let (points, cells) = (mesh.points().to_vec(), mesh.cells().clone());
+    let firsts: Vec<DVec3> = (0..cells.len()).map(|c| points[cells.points(c)[0] as usize]).collect();
+    let names = [("scalar", 1), ("pair", 2), ("rgba", 4)];
+    let at_points = names.map(|n| array(n, &points, &change)).to_vec();
+    let at_cells = names.map(|n| array(n, &firsts, &|_, _, v| v)).to_vec();
+    Mesh::new(points, cells, at_points, at_cells).unwrap()
+}
+
+fn plain(mesh: Mesh) -> Mesh {
+    with_arrays(mesh, |_, _, v| v)
+}
+
+fn meshes() -> Vec<(&'static str, Mesh)> {
+    let jumping =
+        with_arrays(generate::unwelded(&generate::tetrahedra(5)), |i, n, v| v + 0.05 * ((i / (4 * n)) % 3) as f64);
+    let holed = with_arrays(generate::hexahedra(6), |i, _, v| if i % 37 == 0 { f64::NAN } else { v });
+    vec![
+        ("tetrahedra", plain(generate::tetrahedra(9))),
+        ("hexahedra", plain(generate::hexahedra(7))),
+        ("islands", plain(generate::islands(14))),
+        ("unwelded", jumping),
+        ("t_junction", plain(generate::t_junction(3))),
+        ("ring", plain(generate::ring(7))),
+        ("demo", plain(generate::demo(6))),
+        ("invalid values", holed),
+    ]
+}
+
+fn draw(renderer: &mut Renderer, view: &View) -> Image {
+    renderer.render(view, &|_| ()).unwrap()
+}
+
+/// Draws `frames` frames of each mesh on the device and on the CPU, and compares them. The device knows places to 1e-7 only,
+/// so that pixels may differ by more than 2e-5 where a function is as good as a step: one in a thousand, and by 5e-4.
+fn compare(frames: usize, size: [u32; 2], seed: u64) {
+    let Some(choice) = choice() else { return };
+    let mut random = Random(seed);
+    let (mut beyond, mut all) = (0, 0);
+    for (name, mesh) in meshes() {
+        let mut pair = [choice.clone(), DeviceChoice::Cpu].map(|c| Renderer::with_device(0, c).unwrap());
+        for r in &mut pair {
+            r.set_mesh(&mesh, Tetrahedra::new(&mesh).unwrap());
+        }
+        for frame in 0..frames {
+            let array = ["scalar", "pair", "rgba"][random.below(3)];
+            let association = [Association::Point, Association::Cell][random.below(2)];
+            let field = Field::new(&mesh, array, Some(association), Component::All).unwrap();
+            let transfer = random_transfer(&mut random, frame % 5 == 4);
+            let blend = if random.below(5) == 0 { Blend::Maximum } else { Blend::Composite };
+            let view = random_view(&mut random, size).with_blend(blend);
+            let [got, want] = pair.each_mut().map(|r| {
+                r.set_field(&field).unwrap();
+                r.set_transfer(&transfer);
+                draw(r, &view)
+            });
+            assert_eq!(pair[0].stats().device, "gpu");
+            let mut apart = 0.0;
+            for (g, w) in got.pixels.iter().zip(&want.pixels) {
+                let d = (0..4).fold(0.0, |m, k| f32::max(m, (g[k] - w[k]).abs() / w[k].max(1.0)));
+                assert!(g.iter().all(|v| v.is_finite()), "{name} {frame}: {g:?}, not {w:?}");
+                (beyond, all) = (beyond + usize::from(d > 2e-5), all + 1);
+                apart = f32::max(apart, d);
+            }
+            let what =
+                format!("{apart:.2e}: {name}, frame {frame}: {array} {association:?} {blend:?} {:?}", view.camera());
+            if apart > 2e-5 {
+                eprintln!("{what}");
+            }
+            assert!(apart <= 5e-4, "{what} {transfer:?}");
+        }
+    }
+    eprintln!("{beyond} of {all} pixels are more than 2e-5 apart");
+    assert!(beyond * 1000 <= all);
+}
+
+#[test]
+fn the_twins_agree() {
+    compare(8, [48, 40], 11);
+}
+
+#[test]
+#[ignore = "a thousand frames take minutes"]
+fn the_twins_agree_a_thousand_times() {
+    compare(125, [40, 40], 17);
+}
+
+#[test]
+fn only_what_changed_is_handed_over() {
+    let Some(choice) = choice() else { return };
+    let mesh = plain(generate::tetrahedra(9));
+    let mut random = Random(1);
+    let mut renderer = Renderer::with_device(0, choice).unwrap();
+    renderer.set_mesh(&mesh, Tetrahedra::new(&mesh).unwrap());
+    let field = |name: &str| Field::new(&mesh, name, Some(Association::Point), Component::All).unwrap();
+    renderer.set_field(&field("scalar")).unwrap();
+    renderer.set_transfer(&random_transfer(&mut random, false));
+    let camera = Camera {
+        position: DVec3::new(3.0, 2.0, 1.0),
+        focal_point: DVec3::ZERO,
+        view_up: DVec3::Z,
+        projection: Projection::Perspective { view_angle: 40.0 },
+    };
+    let view = View::new(camera, [32, 32]).unwrap();
+    let points = mesh.points().len() as u64;
+    let bytes = |renderer: &mut Renderer| {
+        draw(renderer, &view);
+        renderer.stats().uploaded_bytes
+    };
+    let first = bytes(&mut renderer);
+    assert!(first > 36 * 6 * 512);
+    let still = bytes(&mut renderer);
+    assert_eq!(still, size_of::<Frame>() as u64, "a still frame needs its view only");
+    renderer.set_transfer(&random_transfer(&mut random, false));
+    let function = bytes(&mut renderer) - still;
+    assert!(function > 0 && function < 200_000);
+    renderer.set_field(&field("scalar")).unwrap();
+    assert_eq!(bytes(&mut renderer) - still - function, 4 * points);
+    renderer.set_field(&field("rgba")).unwrap();
+    let rgba = bytes(&mut renderer) - still;
+    assert!(rgba >= 16 * points && rgba < 16 * points + 200_000);
+    let moved: Vec<DVec3> = mesh.points().iter().map(|p| *p * 0.5).collect();
+    renderer.set_points(&moved).unwrap();
+    let placed = bytes(&mut renderer) - still;
+    assert!(placed > 12 * points && placed < 12 * points + 100_000, "{placed}");
+}
+
+#[test]
+fn a_lost_device_is_survived() {
+    let Some(choice) = choice() else { return };
+    let mesh = plain(generate::tetrahedra(6));
+    let mut random = Random(9);
+    let mut renderer = Renderer::with_device(0, choice).unwrap();
+    renderer.set_mesh(&mesh, Tetrahedra::new(&mesh).unwrap());
+    renderer.set_field(&Field::new(&mesh, "scalar", None, Component::All).unwrap()).unwrap();
+    renderer.set_transfer(&random_transfer(&mut random, false));
+    let view = random_view(&mut random, [24, 24]);
+    let before = draw(&mut renderer, &view);
+    for _ in 0..3 {
+        renderer.device().unwrap().gpu().device.destroy();
+        assert_eq!(draw(&mut renderer, &view), before);
+        assert_eq!(renderer.stats().device, "gpu");
+    }
+}
+
+#[test]
+fn the_budget_is_kept() {
+    let Some(choice) = choice() else { return };
+    let mesh = plain(generate::tetrahedra(9));
+    let mut random = Random(2);
+    let mut renderer = Renderer::with_device(0, choice).unwrap();
+    renderer.set_mesh(&mesh, Tetrahedra::new(&mesh).unwrap());
+    renderer.set_field(&Field::new(&mesh, "scalar", None, Component::All).unwrap()).unwrap();
+    renderer.set_transfer(&random_transfer(&mut random, false));
+    let view = random_view(&mut random, [24, 24]);
+    renderer.device().unwrap().gpu.budget = 10_000;
+    let refused = renderer.render(&view, &|_| ());
+    assert!(matches!(refused, Err(Error::Memory { allowed: 10_000, .. })), "{refused:?}");
+    renderer.device().unwrap().gpu.budget = 1 << 30;
+    draw(&mut renderer, &view);
+}
+
+#[test]
+fn names_of_devices_are_parsed() {
+    assert_eq!(DeviceChoice::parse("CPU"), DeviceChoice::Cpu);
+    assert_eq!(DeviceChoice::parse("auto"), DeviceChoice::Auto);
+    assert_eq!(DeviceChoice::parse(" llvmpipe "), DeviceChoice::Named("llvmpipe".into()));
+    if choice().is_some() {
+        let refused = Gpu::open(&DeviceChoice::Named("no such device".into()));
+        assert!(matches!(refused, Err(Error::Device(what)) if what.contains("cpu")));
+    }
+}
+
+#[test]
+#[ignore = "takes 4 GB and a minute"]
+fn ten_million_tetrahedra_are_drawn() {
+    let Some(choice) = choice() else { return };
+    let mesh = generate::tetrahedra(119);
+    let mut renderer = Renderer::with_device(0, choice).unwrap();
+    renderer.set_mesh(&mesh, Tetrahedra::new(&mesh).unwrap());
+    renderer.set_field(&Field::new(&mesh, "s", None, Component::All).unwrap()).unwrap();
+    let mut random = Random(4);
+    renderer.set_transfer(&random_transfer(&mut random, false));
+    let camera = Camera {
+        position: DVec3::new(3.0, 2.5, 2.0),
+        focal_point: DVec3::ZERO,
+        view_up: DVec3::Z,
+        projection: Projection::Perspective { view_angle: 40.0 },
+    };
+    let view = View::new(camera, [256, 256]).unwrap();
+    let got = draw(&mut renderer, &view);
+    eprintln!("{:#?}", renderer.stats());
+    draw(&mut renderer, &view);
+    eprintln!("again {} ms", renderer.stats().frame_ms);
+    renderer.device().unwrap();
+    renderer.draw_on_cpu(&Error::Render("to compare".into()));
+    let want = draw(&mut renderer, &view);
+    eprintln!("cpu {} ms", renderer.stats().frame_ms);
+    let apart =
+        got.pixels.iter().flatten().zip(want.pixels.iter().flatten()).fold(0.0, |m: f32, (g, w)| m.max((g - w).abs()));
+    assert!(apart <= 2e-5, "{apart:e}");
+}
