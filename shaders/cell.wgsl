@@ -1,19 +1,30 @@
 // A ray and a tetrahedron: the f32 twin of src/cell.rs, which says why this never gets lost.
 
-/// A ray's own coordinates: two axes across it and one along it.
+/// A place or direction as the sum of two vectors: one float tells places to 1e-7 only, and a steep transfer function shows that.
+struct Twice {
+    high: vec3f,
+    low: vec3f,
+}
+
+/// A ray's own coordinates: two axes across it, of unit length, and one along it, in lengths of its direction.
 struct Ray {
-    origin: vec3f,
+    origin: Twice,
+    /// The high part has 12 digits.
+    direction: Twice,
+    /// Its length.
+    length: f32,
+    /// A unit vector.
+    along: vec3f,
     right: vec3f,
     up: vec3f,
-    along: vec3f,
 }
 
 /// The face that a ray passes through: three projected corners, counter-clockwise around the origin, and twice the areas
 /// of the triangles (origin, next corner, last corner).
 struct Face {
-    a: vec3f,
-    b: vec3f,
-    c: vec3f,
+    a: vec4f,
+    b: vec4f,
+    c: vec4f,
     areas: vec3f,
 }
 
@@ -25,41 +36,85 @@ struct Step {
 
 const NOWHERE = 3u;
 
-/// The frame of the ray from `origin` along the unit vector `along` (Duff et al. 2017).
-fn ray_along(origin: vec3f, along: vec3f) -> Ray {
-    let side = select(-1.0, 1.0, along.z >= 0.0);
-    let a = -1.0 / (side + along.z);
-    let b = along.x * along.y * a;
-    let right = vec3f(1.0 + side * along.x * along.x * a, side * b, -side * along.x);
-    let up = vec3f(b, side + along.y * along.y * a, -along.y);
-    return Ray(origin, right, up, along);
+/// The sum of two vectors, with what its rounding left (Knuth 1969, 4.2.2 B).
+fn sum(a: vec3f, b: vec3f) -> Twice {
+    let s = a + b;
+    let v = s - a;
+    return Twice(s, (a - (s - v)) + (b - v));
 }
 
-/// `p` in the coordinates of the ray. Every fma is written out, so that a point gets the same bits for each of its cells;
-/// tiny coordinates become 0, so that no product of two underflows.
-fn project(ray: Ray, p: vec3f) -> vec3f {
-    let q = p - ray.origin;
-    let x = fma(q.x, ray.right.x, fma(q.y, ray.right.y, q.z * ray.right.z));
-    let y = fma(q.x, ray.up.x, fma(q.y, ray.up.y, q.z * ray.up.z));
-    let t = fma(q.x, ray.along.x, fma(q.y, ray.along.y, q.z * ray.along.z));
-    return vec3f(select(x, 0.0, abs(x) < TINY), select(y, 0.0, abs(y) < TINY), t);
+/// `v` rounded toward zero to 12 digits, so that products of two such numbers are exact whether or not fma is fused.
+fn shortened(v: vec3f) -> vec3f {
+    return bitcast<vec3f>(bitcast<vec3u>(v) & vec3u(0xfffff000u));
 }
 
-/// Twice the area of the triangle (origin, a, b): positive if it turns counter-clockwise.
-fn area(a: vec3f, b: vec3f) -> f32 {
-    return a.x * b.y - a.y * b.x;
+/// v[0] + x v[1] + y v[2], for whole numbers x and y of 14 digits and high parts of v[1] and v[2] of 10.
+fn affine(v: array<Twice, 3>, x: f32, y: f32) -> Twice {
+    let first = sum(v[0].high, v[1].high * x);
+    let second = sum(first.high, v[2].high * y);
+    return sum(second.high, (first.low + second.low) + (v[0].low + (v[1].low * x + v[2].low * y)));
+}
+
+/// The frame of the ray from `origin` along `direction` (Duff et al. 2017).
+fn ray_along(origin: Twice, direction: Twice) -> Ray {
+    let high = shortened(direction.high);
+    let low = (direction.high - high) + direction.low;
+    let size = length(direction.high);
+    let n = direction.high / size;
+    let side = select(-1.0, 1.0, n.z >= 0.0);
+    let a = -1.0 / (side + n.z);
+    let b = n.x * n.y * a;
+    let right = vec3f(1.0 + side * n.x * n.x * a, side * b, -side * n.x);
+    let up = vec3f(b, side + n.y * n.y * a, -n.y);
+    return Ray(origin, Twice(high, low), size, n, right, up);
+}
+
+/// `p` in the coordinates of the ray: two across it, and the two parts of one along it. What lies along the ray is taken off
+/// before the axes across it are asked, so that the places across it are as accurate as they are small. Every fma is written
+/// out, so that a point gets the same bits for each of its cells; tiny coordinates become 0, so that no product of two
+/// underflows.
+fn project(ray: Ray, p: Twice) -> vec4f {
+    let q = sum(p.high, -ray.origin.high);
+    let t = shortened(vec3f(dot_fma(q.high, ray.along) / ray.length));
+    let low = q.low + (p.low - ray.origin.low);
+    let aside = (q.high - t * ray.direction.high) + fma(-t, ray.direction.low, low);
+    let x = dot_fma(aside, ray.right);
+    let y = dot_fma(aside, ray.up);
+    let rest = dot_fma(aside, ray.along) / ray.length;
+    return vec4f(select(x, 0.0, abs(x) < TINY), select(y, 0.0, abs(y) < TINY), t.x, rest);
+}
+
+fn dot_fma(a: vec3f, b: vec3f) -> f32 {
+    return fma(a.x, b.x, fma(a.y, b.y, a.z * b.z));
+}
+
+/// Twice the area of the triangle (origin, a, b): positive if it turns counter-clockwise. Products are taken with what their
+/// rounding leaves (Dekker 1971), as faces seen edge-on are nothing but that.
+fn area(a: vec4f, b: vec4f) -> f32 {
+    let c = b.yx;
+    let p = a.xy * c;
+    let a_high = a_shortened(a.xy);
+    let c_high = a_shortened(c);
+    let a_low = a.xy - a_high;
+    let c_low = c - c_high;
+    let rest = (((a_high * c_high - p) + a_high * c_low) + a_low * c_high) + a_low * c_low;
+    return (p.x - p.y) + (rest.x - rest.y);
+}
+
+fn a_shortened(v: vec2f) -> vec2f {
+    return bitcast<vec2f>(bitcast<vec2u>(v) & vec2u(0xfffff000u));
 }
 
 /// Whether the origin lies to the left of the line from `a` to `b`, whose area is `twice`. Exact, and never the same for
 /// (b, a) unless the two coincide.
-fn is_left(a: vec3f, b: vec3f, twice: f32) -> bool {
+fn is_left(a: vec4f, b: vec4f, twice: f32) -> bool {
     if abs(twice) > DOUBT * (abs(a.x * b.y) + abs(a.y * b.x)) {
         return twice > 0.0;
     }
     return is_left_exactly(a, b);
 }
 
-fn is_left_exactly(a: vec3f, b: vec3f) -> bool {
+fn is_left_exactly(a: vec4f, b: vec4f) -> bool {
     let p = product(a.x, b.y);
     let q = product(a.y, b.x);
     if any(p != q) {
@@ -97,12 +152,12 @@ fn product(a: f32, b: f32) -> vec4i {
 }
 
 /// The areas of the triangle (a, b, c).
-fn areas_of(a: vec3f, b: vec3f, c: vec3f) -> vec3f {
+fn areas_of(a: vec4f, b: vec4f, c: vec4f) -> vec3f {
     return vec3f(area(b, c), area(c, a), area(a, b));
 }
 
 /// Whether the triangle (a, b, c) with these areas turns counter-clockwise around the origin.
-fn holds(a: vec3f, b: vec3f, c: vec3f, areas: vec3f) -> bool {
+fn holds(a: vec4f, b: vec4f, c: vec4f, areas: vec3f) -> bool {
     // Most triangles are missed clearly.
     if is_left(b, c, areas.x) {
         if is_left(c, a, areas.y) {
@@ -113,7 +168,7 @@ fn holds(a: vec3f, b: vec3f, c: vec3f, areas: vec3f) -> bool {
 }
 
 /// Walks through the cell that has this face and the further corner `apex`, to the other face that holds the origin.
-fn step(face: Face, apex: vec3f) -> Step {
+fn step(face: Face, apex: vec4f) -> Step {
     let to = vec3f(area(apex, face.a), area(apex, face.b), area(apex, face.c));
     let a = is_left(apex, face.a, to.x);
     let b = is_left(apex, face.b, to.y);
@@ -135,4 +190,17 @@ fn weights_of(areas: vec3f) -> vec3f {
     let sum = areas.x + areas.y + areas.z;
     // A face that is seen edge-on: any of its points is as good as another.
     return select(vec3f(1.0, 0.0, 0.0), areas / sum, sum > 0.0);
+}
+
+/// Where along the ray the point of the face with these weights is, in two parts: differences of such are as accurate as
+/// they are small.
+fn depth_of(face: Face, weights: vec3f) -> vec2f {
+    let b = depth_between(face.a.zw, face.b.zw);
+    let c = depth_between(face.a.zw, face.c.zw);
+    return vec2f(face.a.z, face.a.w + (weights.y * b + weights.z * c));
+}
+
+/// From `a` to `b`, both in two parts.
+fn depth_between(a: vec2f, b: vec2f) -> f32 {
+    return (b.x - a.x) + (b.y - a.y);
 }

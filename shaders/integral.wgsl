@@ -31,7 +31,7 @@ struct Track {
     rise: f32,
 }
 
-/// Iterations of loops so far, about.
+/// Iterations of loops so far, at least; each loop counts once more when it ends.
 var<private> work: u32;
 
 /// Light gathered from front to back: premultiplied colour, and how much of what lies behind comes through.
@@ -80,7 +80,7 @@ fn quadrature(x: f32, y: f32) -> vec2f {
     }
     let panels = u32(min(max(x, x + (y - x) * end) * end / PANEL, 64.0)) + 1u;
     let width = end / f32(panels);
-    work += panels;
+    work += panels + 1u;
     for (var p = 0u; p < panels; p++) {
         let start = width * f32(p);
         sum += node(x, y, start, width, GAUSS_6_0);
@@ -111,6 +111,7 @@ fn track(first: u32, last: u32, bucket: u32, front: f32, back: f32) -> Track {
     if b + 1u < BUCKETS {
         above = buckets[bucket + b + 1u] + 1u;
     }
+    work += 4u;
     while above > i + 1u {
         let middle = (i + above) / 2u;
         if knots[middle].s <= front {

@@ -18,18 +18,16 @@ struct Box {
     high: vec3f,
 }
 
-/// All rays of a frame. At (x, y), each in [−1, 1] across the image, the ray starts at origin · (1, x, y) and runs along
-/// direction · (1, x, y); coordinates are the mesh's normalised ones.
+/// All rays of a frame: that of column x and row y starts at origin · (1, x, y) and runs along direction · (1, x, y);
+/// coordinates are the mesh's normalised ones.
 struct Frame {
-    origin: array<vec4f, 3>,
-    direction: array<vec4f, 3>,
+    origin: array<Twice, 3>,
+    direction: array<Twice, 3>,
     /// Width and height of the image, in pixels.
     size: vec2u,
     /// The rows that this dispatch draws.
     first_row: u32,
     rows: u32,
-    /// From a pixel's centre to its sample, in units of x and y.
-    offset: vec2f,
     /// The part of a ray that is seen, in lengths of its direction.
     near: f32,
     far: f32,
@@ -61,14 +59,15 @@ struct Counts {
 @group(0) @binding(6) var<storage, read_write> pixels: array<vec4f>;
 @group(0) @binding(7) var<storage, read_write> counts: Counts;
 
-/// Where a ray enters the mesh.
+/// A boundary face that the ray enters through, and where.
 struct Entry {
     t: f32,
-    index: u32,
-    cell: u32,
-    points: vec3u,
-    face: Face,
+    face: u32,
 }
+
+/// Entries found ahead of the walk, in order: a search that has to start again costs as much as finding several.
+var<private> ahead: array<Entry, AHEAD>;
+var<private> known: u32;
 
 /// The largest values along a ray; the last of them at −FAR if there are none.
 var<private> largest: Value;
@@ -82,21 +81,17 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= frame.size.x || id.y >= frame.rows {
         return;
     }
-    let column = i32(id.x);
-    let row = i32(id.y + frame.first_row);
-    let size = vec2i(frame.size);
-    let x = f32(2 * column + 1 - size.x) / f32(size.x) + frame.offset.x;
-    let y = f32(size.y - 2 * row - 1) / f32(size.y) + frame.offset.y;
-    let origin = fma(frame.origin[2].xyz, vec3f(y), fma(frame.origin[1].xyz, vec3f(x), frame.origin[0].xyz));
-    let direction = fma(frame.direction[2].xyz, vec3f(y), fma(frame.direction[1].xyz, vec3f(x), frame.direction[0].xyz));
-    let along = length(direction);
-    let straight = ray_along(origin, direction / along);
-    var limits = vec2f(frame.near, frame.far) * along;
+    let column = f32(id.x);
+    let row = id.y + frame.first_row;
+    let direction = affine(frame.direction, column, f32(row));
+    let straight = ray_along(affine(frame.origin, column, f32(row)), direction);
+    var limits = vec2f(frame.near, frame.far);
     if frame.has_ends != 0u {
-        limits.y = min(limits.y, ends[u32(row) * frame.size.x + id.x]);
+        limits.y = min(limits.y, ends[row * frame.size.x + id.x]);
     }
     for (var k = 0u; k < frame.planes; k++) {
-        limits = clipped(limits, dot(origin, planes[k].xyz) + planes[k].w, dot(straight.along, planes[k].xyz));
+        let height = dot(straight.origin.high, planes[k].xyz) + planes[k].w;
+        limits = clipped(limits, height, dot(direction.high, planes[k].xyz));
     }
     steps = 0u;
     work = 0u;
@@ -142,32 +137,39 @@ fn trace(straight: Ray, limits: vec2f) {
             return;
         }
         let aside = ASIDE * f32(attempt);
-        ray.origin = straight.origin + (straight.right + straight.up * 0.618) * aside;
+        ray.origin.low = straight.origin.low + (straight.right + straight.up * 0.618) * aside;
         atomicAdd(&counts.repaired, select(0u, 1u, attempt == 1u));
     }
 }
 
+/// Whether nothing behind can be seen.
+fn is_over() -> bool {
+    return light.w < LEAST_LIGHT;
+}
+
 /// Walks from each entry to the next.
 fn follow(ray: Ray, limits: vec2f) {
-    let inverse = 1.0 / select(ray.along, vec3f(1e-20), abs(ray.along) < vec3f(1e-20));
+    let along = ray.along * ray.length;
+    let inverse = 1.0 / select(along, vec3f(1e-20), abs(along) < vec3f(1e-20));
     let inside = span(boxes(0u), ray, inverse);
     if inside.x > inside.y || inside.y < limits.x || inside.x > limits.y || limits.x >= limits.y {
         finished = true;
         return;
     }
-    var entry: Entry;
-    entry.t = -FAR;
-    entry.index = 0u;
+    var entry = Entry(-FAR, 0u);
     loop {
-        entry = next_entry(ray, inverse, entry.t, entry.index, limits.y);
-        if entry.index == NONE {
-            finished = work <= frame.most_work;
-            return;
+        find_entries(ray, inverse, entry, limits.y);
+        for (var k = 0u; k < known && work <= frame.most_work; k++) {
+            work++;
+            entry = ahead[k];
+            if !walk(ray, entry, limits) {
+                return;
+            }
+            if is_over() {
+                known = 0u;
+            }
         }
-        if !walk(ray, entry, limits) {
-            return;
-        }
-        if light.w < NEGLIGIBLE {
+        if known < AHEAD {
             finished = work <= frame.most_work;
             return;
         }
@@ -176,18 +178,17 @@ fn follow(ray: Ray, limits: vec2f) {
 
 /// Where a ray enters and leaves a box.
 fn span(b: Box, ray: Ray, inverse: vec3f) -> vec2f {
-    let low = (b.low - ray.origin) * inverse;
-    let high = (b.high - ray.origin) * inverse;
+    let low = (b.low - ray.origin.high) * inverse;
+    let high = (b.high - ray.origin.high) * inverse;
     let near = min(low, high);
     let far = max(low, high);
     return vec2f(max(max(near.x, near.y), near.z) - SLACK, min(min(far.x, far.y), far.z) + SLACK);
 }
 
-/// The first face that the ray enters through after (`after`, `index`) and before `limit`.
-fn next_entry(ray: Ray, inverse: vec3f, after: f32, index: u32, limit: f32) -> Entry {
-    var best: Entry;
-    best.t = limit;
-    best.index = NONE;
+/// Finds the first faces that the ray enters through after `last` and before `limit`.
+fn find_entries(ray: Ray, inverse: vec3f, last: Entry, limit: f32) {
+    known = 0u;
+    var farthest = limit;
     // The children of node n are 2n and 2n + 1; the root is node 1.
     var n = 1u;
     loop {
@@ -197,29 +198,24 @@ fn next_entry(ray: Ray, inverse: vec3f, after: f32, index: u32, limit: f32) -> E
         }
         let b = boxes(n - 1u);
         let inside = span(b, ray, inverse);
-        let meets = b.low.x <= b.high.x && inside.x <= inside.y && inside.x <= best.t && inside.y >= after;
+        let meets = b.low.x <= b.high.x && inside.x <= inside.y && inside.x <= farthest && inside.y >= last.t;
         if meets && n < frame.leaves {
             n *= 2u;
             continue;
         }
         if meets {
             let first = (n - frame.leaves) * LEAF;
-            work += LEAF;
+            work += LEAF + 1u;
             for (var k = first; k < min(first + LEAF, frame.faces); k++) {
-                let outer = faces(k);
-                // Seen along a ray that enters, the face turns clockwise: its mirror image does not.
-                let ids = outer.points.xzy;
-                let a = project(ray, position(ids.x));
-                let b = project(ray, position(ids.y));
-                let c = project(ray, position(ids.z));
-                let areas = areas_of(a, b, c);
-                if !holds(a, b, c, areas) {
+                let face = face_of(ray, entering(faces(k).points));
+                if !holds(face.a, face.b, face.c, face.areas) {
                     continue;
                 }
-                let t = dot(weights_of(areas), vec3f(a.z, b.z, c.z));
-                let is_later = t > after || (t == after && k > index) || after == -FAR;
-                if is_later && (t < best.t || (t == best.t && k < best.index)) {
-                    best = Entry(t, k, outer.cell, ids, Face(a, b, c, areas));
+                let depth = depth_of(face, weights_of(face.areas));
+                let entry = Entry(depth.x + depth.y, k);
+                if entry.t < limit && (last.t == -FAR || is_before(last, entry)) {
+                    insert(entry);
+                    farthest = select(limit, ahead[AHEAD - 1u].t, known == AHEAD);
                 }
             }
         }
@@ -230,23 +226,54 @@ fn next_entry(ray: Ray, inverse: vec3f, after: f32, index: u32, limit: f32) -> E
             break;
         }
     }
-    return best;
 }
 
-fn position(i: u32) -> vec3f {
+fn is_before(a: Entry, b: Entry) -> bool {
+    return a.t < b.t || (a.t == b.t && a.face < b.face);
+}
+
+/// Puts an entry into its place among those known; the last one goes if there are too many.
+fn insert(entry: Entry) {
+    var k = min(known, AHEAD - 1u);
+    if known == AHEAD && !is_before(entry, ahead[k]) {
+        return;
+    }
+    known = min(known + 1u, AHEAD);
+    while k > 0u && is_before(entry, ahead[k - 1u]) {
+        work++;
+        ahead[k] = ahead[k - 1u];
+        k--;
+    }
+    ahead[k] = entry;
+}
+
+/// Seen along a ray that enters, a face turns clockwise: its mirror image does not.
+fn entering(points: vec3u) -> vec3u {
+    return points.xzy;
+}
+
+fn face_of(ray: Ray, ids: vec3u) -> Face {
+    let a = project(ray, position(ids.x));
+    let b = project(ray, position(ids.y));
+    let c = project(ray, position(ids.z));
+    return Face(a, b, c, areas_of(a, b, c));
+}
+
+fn position(i: u32) -> Twice {
     let p = points(i);
-    return vec3f(p.x, p.y, p.z);
+    return Twice(vec3f(p.x, p.y, p.z), vec3f(p.x_low, p.y_low, p.z_low));
 }
 
 /// Walks from an entry until the ray leaves the mesh or ends; false if it got lost.
 fn walk(ray: Ray, entry: Entry, limits: vec2f) -> bool {
-    var face = entry.face;
-    var ids = entry.points;
-    var cell = entry.cell;
-    var t = entry.t;
+    let outer = faces(entry.face);
+    var ids = entering(outer.points);
+    var face = face_of(ray, ids);
+    var cell = outer.cell;
     // How far along the ray nothing is to be gathered yet.
-    var behind = max(limits.x - t, 0.0);
+    var behind = max(limits.x - entry.t, 0.0) * ray.length;
     var weights = weights_of(face.areas);
+    var entered = depth_of(face, weights);
     var corners: Corners;
     var front: Value;
     if ASSOCIATION == POINT {
@@ -293,23 +320,26 @@ fn walk(ray: Ray, entry: Entry, limits: vec2f) -> bool {
             back = interpolated(corners, weights);
         }
 
-        // The exact length of the segment comes from the volume, relative to itself; where it ends, from the corners.
+        // The length comes from the volume, which is right in the thinnest cell. But in one that is seen edge-on the areas are not,
+        // and the depths of the corners are.
         let share = dot(weights, select(vec3f(), vec3f(1.0), drops));
-        let ahead = dot(weights, vec3f(face.a.z, face.b.z, face.c.z)) - t;
-        let length = clamp(rise * share, ahead - SHARP, ahead + SHARP);
+        let left_at = depth_of(face, weights);
+        let ahead = depth_between(entered, left_at) * ray.length;
+        let doubt = BLUR * extent(face, p);
+        let length = clamp(rise * share, ahead - doubt, ahead + doubt);
         if length <= behind {
             behind -= length;
         } else {
-            let end = min(length, limits.y - t);
+            let end = min(length, (limits.y - (entered.x + entered.y)) * ray.length);
             if behind < end {
                 gather(front, back, vec2f(behind, end) / length, end - behind);
             }
             behind = 0.0;
-            if end < length || light.w < NEGLIGIBLE {
+            if end < length || is_over() {
                 return true;
             }
         }
-        t += length;
+        entered = left_at;
         front = back;
         let beyond = vec4u(left_behind) == c.corners;
         cell = select(select(select(c.neighbours.w, c.neighbours.z, beyond.z), c.neighbours.y, beyond.y), c.neighbours.x, beyond.x);
@@ -318,6 +348,14 @@ fn walk(ray: Ray, entry: Entry, limits: vec2f) -> bool {
         }
     }
     return false;
+}
+
+/// How far the corners of a face, and `p`, are from the ray and from each other along it, at most and about.
+fn extent(face: Face, p: vec4f) -> f32 {
+    let across = max(max(abs(face.a.xy), abs(face.b.xy)), max(abs(face.c.xy), abs(p.xy)));
+    let b = depth_between(face.a.zw, face.b.zw);
+    let c = depth_between(face.a.zw, face.c.zw);
+    return max(max(across.x, across.y), max(abs(b), abs(c)));
 }
 
 /// The values at the corners of a face.
@@ -333,7 +371,8 @@ fn of_corner(own: array<Value, 4>, ids: vec4u, id: u32) -> Value {
 }
 
 fn interpolated(corners: Corners, weights: vec3f) -> Value {
-    let v = corners.a * weights.x + corners.b * weights.y + corners.c * weights.z;
+    // Differences to one corner, which are small: weights that are off by 1e-7 must not shift a value by as much.
+    let v = corners.a + ((corners.b - corners.a) * weights.y + (corners.c - corners.a) * weights.z);
     let seen = is_visible(corners.a) && is_visible(corners.b) && is_visible(corners.c);
     return select(Value(INVISIBLE), v, seen);
 }

@@ -7,7 +7,7 @@ pub(crate) mod shader;
 
 use crate::error::{Error, Result};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, Once, PoisonError};
 
 /// Where frames are drawn.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -171,7 +171,8 @@ impl Gpu {
             }
             (None, _) => {
                 let found = if known.is_empty() { "none".into() } else { known };
-                tracing::info!("drawing on the CPU: no GPU of use was found (found: {found})");
+                static SAID: Once = Once::new();
+                SAID.call_once(|| tracing::info!("drawing on the CPU: no GPU of use was found (found: {found})"));
                 Ok(None)
             }
             (Some((Description { name, lacks: Some(lacks), .. }, _)), _) => {

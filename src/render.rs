@@ -76,6 +76,8 @@ pub struct Stats {
     pub steps: u64,
     /// Rays of the last frame that had to be traced again beside an edge.
     pub repaired_rays: u64,
+    /// Rays of the last frame that the device left to the CPU, as they take more work than its driver allows.
+    pub cpu_rays: u64,
     /// Memory held on the device for mesh and field, in bytes.
     pub device_bytes: u64,
     /// What had to be handed to the device for the last frame, in bytes; 0 on the CPU.
@@ -269,6 +271,7 @@ impl Renderer {
         self.stats.device_ms = device_ms;
         self.stats.steps = counts.steps;
         self.stats.repaired_rays = counts.repaired;
+        self.stats.cpu_rays = counts.unfinished;
         self.stats.frame_ms = ms(start);
         Ok(image)
     }
@@ -317,7 +320,7 @@ impl Frame<'_> {
         }
         let by_cpu = cpu::render_pixels(geometry, values, self.exact, &pixel, self.view, &unfinished);
         unfinished.iter().zip(by_cpu).for_each(|(&i, p)| drawn.pixels[i] = p);
-        drawn.counts.repaired += unfinished.len() as u64;
+        drawn.counts.unfinished = unfinished.len() as u64;
         (self.progress)(1.0);
         let mut image = Image::new(self.view.size());
         image.pixels = drawn.pixels;

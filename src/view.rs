@@ -101,6 +101,15 @@ pub struct Fan {
     pub offset: DVec2,
 }
 
+impl Fan {
+    /// `v`, one of the fan's two forms, per column and row of an image of `size` pixels: pixel (i, j) has v · (1, i, j).
+    pub fn by_pixel(&self, v: [DVec3; 3], size: [u32; 2]) -> [DVec3; 3] {
+        let [w, h] = size.map(f64::from);
+        let first = v[0] + v[1] * (1.0 / w - 1.0 + self.offset.x) + v[2] * (1.0 - 1.0 / h + self.offset.y);
+        [first, v[1] * (2.0 / w), v[2] * (-2.0 / h)]
+    }
+}
+
 /// What to draw: the camera, the size of the image and everything that limits the rays.
 #[derive(Debug, Clone, PartialEq)]
 pub struct View {

@@ -215,6 +215,29 @@ fn a_scene_and_options() {
 }
 
 #[test]
+fn bench_measures_every_device() {
+    let place = Place::new();
+    place.write("scene.json", SCENE);
+    let table = place.succeeds("bench scene.json --frames 2 --json x.json");
+    assert!(table.contains("12x8 pixels, 9 cells, 48 tetrahedra"), "{table}");
+    let told: serde_json::Value = serde_json::from_slice(&std::fs::read(place.path("x.json")).unwrap()).unwrap();
+    let others = told["runs"].as_array().unwrap();
+    if std::env::var("HALITE_REQUIRE_GPU").is_ok_and(|v| v == "1") {
+        assert!(!others.is_empty(), "{told}");
+    }
+    for run in others.iter().chain([&told]) {
+        assert!(table.contains(run["adapter"].as_str().unwrap()), "{table}");
+        for key in ["load_ms", "faces_ms", "upload_ms", "first_frame_ms", "frame_ms", "transfer_edit_ms", "steps"] {
+            assert!(run[key].is_number(), "{key}: {run}");
+        }
+        assert!(run["steps"].as_u64() > Some(100), "{run}");
+    }
+    place.succeeds("bench cube.vtu --device cpu --size 8x8 --frames 1");
+    place.misused("bench cube.vtu --frames 0", "--frames");
+    place.fails("bench none.vtu", &["none.vtu"]);
+}
+
+#[test]
 fn the_demo_shows_something() {
     let place = Place::new();
     assert_eq!(place.succeeds("demo").trim(), "halite-demo.png");

@@ -16,9 +16,11 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 /// Width and height of the square of pixels whose rays share their search for entries.
 const TILE: u32 = 8;
 
-/// Transmittance below which a ray ends: what lies behind adds less than this times its colour to any channel. (Direct emission
-/// has no such bound.)
-pub const NEGLIGIBLE: f32 = 1e-6;
+/// Transmittance below which a ray ends: what lies behind adds less than this times its colour to any channel. Direct emission
+/// has no such bound, and goes on as long as f32 can tell.
+pub const fn least_light(direct: bool) -> f32 {
+    if direct { f32::MIN_POSITIVE } else { 1e-6 }
+}
 
 /// A ray that passes a boundary face this close to its edge (as a barycentric weight) is traced again beside it: where
 /// boundary faces only meet without sharing their corners, rounding could let it slip through.
@@ -34,6 +36,8 @@ pub struct Counts {
     pub steps: u64,
     /// Rays that were traced again beside an edge.
     pub repaired: u64,
+    /// Rays that a device left to the CPU.
+    pub unfinished: u64,
 }
 
 /// Draws a frame on the current rayon pool. `pixel` turns the largest values along a ray into a premultiplied colour for
@@ -61,7 +65,11 @@ pub fn render<const N: usize>(
             progress((done.fetch_add(1, Relaxed) + 1) as f64 / bands as f64);
             tracer.counts
         })
-        .reduce(Counts::default, |a, b| Counts { steps: a.steps + b.steps, repaired: a.repaired + b.repaired });
+        .reduce(Counts::default, |a, b| Counts {
+            steps: a.steps + b.steps,
+            repaired: a.repaired + b.repaired,
+            unfinished: 0,
+        });
     (image, counts)
 }
 
@@ -310,7 +318,7 @@ impl<'a, const N: usize> Tracer<'a, N> {
     /// Whether nothing behind can be seen.
     #[inline(always)]
     fn is_over(&self, gathered: &Gathered<N>) -> bool {
-        gathered.light.through < if self.exact.direct { f32::MIN_POSITIVE } else { NEGLIGIBLE }
+        gathered.light.through < least_light(self.exact.direct)
     }
 
     #[inline(always)]

@@ -1,7 +1,7 @@
 //! The walk on a GPU: what `shaders/traverse.wgsl` needs, handed over once and kept until it changes.
 
 use super::boundary::LEAF;
-use super::cpu::{Counts, NEGLIGIBLE};
+use super::cpu::{Counts, least_light};
 use super::{Cell, Geometry, Values};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
@@ -23,7 +23,7 @@ const TRAVERSE: &str = include_str!("../../shaders/traverse.wgsl");
 const RAYS: u64 = 1 << 21;
 
 /// Loop iterations of one ray that llvmpipe surely makes: an eighth of those that 8 rays may make together.
-const LLVMPIPE_WORK: u32 = 8000;
+const LLVMPIPE_WORK: u32 = 4000;
 
 /// Stands for ±∞ in limits of t, which are within ±10 else.
 const FAR: f32 = 1e30;
@@ -38,12 +38,15 @@ const INVISIBLE: f32 = 3e38;
 /// rays start from are at most [`NEAR_EYE`] away.
 const MARGIN: f32 = 2e-6;
 
-/// How well, in normalised units, places along a ray are known when they come from f32 corners. Lengths that come from
-/// volumes are kept within this of them.
-const SHARP: f32 = 2e-6;
+/// How well lengths along a ray are known when they come from the depths of a cell's corners, relative to the cell's extent.
+/// Lengths that come from its volume are kept within this of them.
+const BLUR: f32 = 5e-7;
 
 /// Up to this distance from the mesh's centre, in normalised units, rays start at the eye.
 const NEAR_EYE: f64 = 2.0;
+
+/// Entries that a ray finds at a time.
+const AHEAD: usize = 8;
 
 /// How far aside, in normalised units, a lost ray is tried again.
 const ASIDE: f32 = 2e-7;
@@ -52,12 +55,11 @@ const ASIDE: f32 = 2e-7;
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Frame {
-    origin: [[f32; 4]; 3],
-    direction: [[f32; 4]; 3],
+    origin: [[[f32; 4]; 2]; 3],
+    direction: [[[f32; 4]; 2]; 3],
     size: [u32; 2],
     first_row: u32,
     rows: u32,
-    offset: [f32; 2],
     near: f32,
     far: f32,
     planes: u32,
@@ -66,7 +68,6 @@ struct Frame {
     faces: u32,
     most_steps: u32,
     most_work: u32,
-    padding: [u32; 2],
 }
 
 /// `Function` in the shader.
@@ -187,7 +188,10 @@ impl Traverse {
             self.cells = Some([cells, Chunks::new(gpu, "faces", &geometry.boundary.faces, outer)?]);
         }
         if self.points.is_none() {
-            let points = Chunks::new(gpu, "points", &geometry.points, |p| p.as_vec3().to_array())?;
+            let points = Chunks::new(gpu, "points", &geometry.points, |&p| {
+                let [[x, y, z, _], [x_low, y_low, z_low, _]] = twice(p);
+                [x, y, z, x_low, y_low, z_low]
+            })?;
             let volume = |c: &Cell| six_volumes(c.corners.map(|p| geometry.points[p as usize]));
             let volumes = Chunks::new(gpu, "volumes", &geometry.cells, volume)?;
             let boxes = Chunks::new(gpu, "boxes", geometry.boundary.boxes(), outward)?;
@@ -293,12 +297,11 @@ impl Traverse {
             .collect();
         let ends = ends(view, &fan, geometry.scale);
         let frame = Frame {
-            origin: fan.origin.map(|v| v.as_vec3().extend(0.0).to_array()),
-            direction: fan.direction.map(|v| v.as_vec3().extend(0.0).to_array()),
+            origin: affine(fan.by_pixel(fan.origin, [w, h])),
+            direction: affine(fan.by_pixel(fan.direction, [w, h])),
             size: [w, h],
             first_row: 0,
             rows: 0,
-            offset: fan.offset.as_vec2().to_array(),
             near: (fan.near as f32).clamp(-FAR, FAR),
             far: (fan.far as f32).clamp(-FAR, FAR),
             planes: planes.len() as u32,
@@ -307,7 +310,6 @@ impl Traverse {
             faces: geometry.boundary.faces.len() as u32,
             most_steps: geometry.cells.len() as u32,
             most_work: if gpu.adapter.kind == "CPU" { LLVMPIPE_WORK } else { u32::MAX },
-            padding: [0; 2],
         };
         let rows = (RAYS / u64::from(w)).clamp(1, u64::from(h)) as u32;
         let size = u64::from(w) * u64::from(rows) * 16;
@@ -410,17 +412,20 @@ fn program(variant: &Variant, association: &str, blend: Blend, arrays: &[Array])
         ("FAR", f64::from(FAR)),
         ("UNFINISHED", f64::from(UNFINISHED)),
         ("INVISIBLE", f64::from(INVISIBLE)),
-        ("SHARP", f64::from(SHARP)),
+        ("BLUR", f64::from(BLUR)),
         ("SLACK", f64::from(MARGIN)),
         ("ASIDE", f64::from(ASIDE)),
-        ("NEGLIGIBLE", f64::from(NEGLIGIBLE)),
+        ("LEAST_LIGHT", f64::from(least_light(variant.direct))),
     ] {
         text += &format!("const {name} = {value:?}f;\n");
     }
-    text +=
-        &format!("const NONE = {BOUNDARY}u;\nconst LEAF = {LEAF}u;\nconst MAXIMUM = {};\n", blend == Blend::Maximum);
+    text += &format!(
+        "const NONE = {BOUNDARY}u;\nconst LEAF = {LEAF}u;\nconst AHEAD = {AHEAD}u;\nconst MAXIMUM = {};\n",
+        blend == Blend::Maximum
+    );
     text += "const POINT = 0u;\nconst CORNER = 1u;\nconst CELL = 2u;\n";
-    text += &format!("const ASSOCIATION = {association};\nstruct Point {{ x: f32, y: f32, z: f32 }}\n");
+    text += &format!("const ASSOCIATION = {association};\n\n");
+    text += "struct Point { x: f32, y: f32, z: f32, x_low: f32, y_low: f32, z_low: f32 }\n";
     text += &shader::accessors(arrays);
     [&text, shader::CELL, shader::INTEGRAL, TRAVERSE].join("\n")
 }
@@ -452,10 +457,26 @@ fn ends(view: &View, fan: &Fan, scale: f64) -> Vec<f32> {
     let pixels = 0..w as usize * h as usize;
     let end = |p: usize| {
         let ray = view.ray((p % w as usize) as u32, (p / w as usize) as u32);
-        let start = fan.ahead / ray.direction.dot(fan.direction[0]);
-        ((ray.t_max * scale - start) as f32).clamp(-FAR, FAR)
+        let cos = ray.direction.dot(fan.direction[0]);
+        ((ray.t_max * scale * cos - fan.ahead) as f32).clamp(-FAR, FAR)
     };
     pixels.into_par_iter().map(end).collect()
+}
+
+/// `v` as a sum of two vectors of f32.
+fn twice(v: DVec3) -> [[f32; 4]; 2] {
+    let high = v.as_vec3();
+    [high, (v - high.as_dvec3()).as_vec3()].map(|v| v.extend(0.0).to_array())
+}
+
+/// What the shader computes v · (1, i, j) from: the products of pixels and high parts are exact.
+fn affine([first, by_column, by_row]: [DVec3; 3]) -> [[[f32; 4]; 2]; 3] {
+    let short = |v: DVec3| {
+        let high = v.as_vec3().to_array().map(|x| f32::from_bits(x.to_bits() & !0x3fff));
+        let low = (v - DVec3::from(high.map(f64::from))).as_vec3();
+        [[high[0], high[1], high[2], 0.0], low.extend(0.0).to_array()]
+    };
+    [twice(first), short(by_column), short(by_row)]
 }
 
 /// Six times the volume of a tetrahedron.

@@ -1,5 +1,6 @@
 //! The standalone program.
 
+mod bench;
 mod camera;
 mod choose;
 mod demo;
@@ -33,10 +34,12 @@ struct Cli {
 enum Command {
     Render(Box<render::Options>),
     Info(info::Options),
+    Bench(Box<bench::Options>),
     Demo(demo::Options),
 }
 
 fn main() -> ExitCode {
+    hush_mesa();
     let cli = Cli::parse();
     let level = if cli.verbose { tracing::Level::INFO } else { tracing::Level::WARN };
     tracing_subscriber::fmt()
@@ -55,12 +58,22 @@ fn main() -> ExitCode {
     }
 }
 
+/// Mesa's selection of devices asks Wayland, which complains on stderr where there is no session.
+#[allow(unsafe_code, reason = "set_var is unsafe where other threads run; here none does yet")]
+fn hush_mesa() {
+    if std::env::var_os("XDG_RUNTIME_DIR").is_none() {
+        // SAFETY: the process has one thread.
+        unsafe { std::env::set_var("NODEVICE_SELECT", "1") }
+    }
+}
+
 fn run(cli: Cli) -> Result<()> {
     match cli.command {
         Command::Render(options) => render::run(&options, cli.threads),
         Command::Info(options) => {
             Renderer::with_device(cli.threads, DeviceChoice::Cpu)?.install(|| info::run(&options))
         }
+        Command::Bench(options) => bench::run(&options, cli.threads),
         Command::Demo(options) => demo::run(&options, &mut Renderer::new(cli.threads)?),
     }
 }

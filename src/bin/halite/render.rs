@@ -19,21 +19,28 @@ use std::time::Instant;
 /// values hold unless an option says otherwise.
 #[derive(Args)]
 pub(crate) struct Options {
-    /// The mesh, or the scene that describes it (.json)
-    #[arg(value_name = "MESH.vtu|SCENE.json")]
-    input: PathBuf,
+    #[command(flatten)]
+    request: Request,
     /// The picture: .png (8-bit), .exr or .npy (linear premultiplied RGBA, 32-bit float)
     #[arg(short, long, value_name = "FILE")]
     out: PathBuf,
+    /// Write what was done, and the time and memory it took, as JSON
+    #[arg(long, value_name = "FILE")]
+    stats: Option<PathBuf>,
+}
+
+/// What to draw, and how.
+#[derive(Args)]
+pub(crate) struct Request {
+    /// The mesh, or the scene that describes it (.json)
+    #[arg(value_name = "MESH.vtu|SCENE.json")]
+    input: PathBuf,
     /// Width and height in pixels [default: the scene's, or 1024x768]
     #[arg(long, value_name = "WxH", value_parser = parse::size)]
     size: Option<[u32; 2]>,
     /// What a .png shows behind the volume: R,G,B in 0 to 1, "black", "white", or "none" for transparency
     #[arg(long, value_name = "COLOR", value_parser = parse::background)]
     background: Option<parse::Background>,
-    /// Write what was done, and the time and memory it took, as JSON
-    #[arg(long, value_name = "FILE")]
-    stats: Option<PathBuf>,
 
     /// The array to draw [default: the first useful one]
     #[arg(long, value_name = "NAME", help_heading = "Field")]
@@ -107,17 +114,10 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     if let Some(path) = &options.stats {
         output::check(path)?;
     }
-    let from_file = options.input.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-    let given = if from_file { Some(Scene::open(&options.input)?) } else { None };
-    check_engine(given.as_ref()).with_context(|| options.input.display().to_string())?;
-    let device = match (&options.device, given.as_ref().and_then(|scene| scene.device.as_ref())) {
-        (Some(name), _) => name.clone(),
-        (None, Some(serde_json::Value::String(name))) => name.clone(),
-        (None, Some(index)) => index.to_string(),
-        (None, None) => "auto".into(),
-    };
-    let mut renderer = Renderer::with_device(threads, DeviceChoice::parse(&device))?;
-    let job = renderer.install(|| prepare(options, given))?;
+    let request = &options.request;
+    let given = request.scene()?;
+    let mut renderer = Renderer::with_device(threads, request.device(given.as_ref()))?;
+    let job = renderer.install(|| prepare(request, given))?;
     let background = job.scene.background;
     let drawn = draw(job, &mut renderer)?;
     drawn.image.save(&options.out, backdrop(background, drawn.behind.as_deref()))?;
@@ -138,7 +138,7 @@ pub(crate) struct Job {
     pub(crate) split_ms: f64,
 }
 
-fn prepare(options: &Options, given: Option<Scene>) -> Result<Job> {
+pub(crate) fn prepare(options: &Request, given: Option<Scene>) -> Result<Job> {
     let map = options.colormap.as_deref().map(color_map).transpose()?;
     let from_file = given.is_some();
     let start = Instant::now();
@@ -178,7 +178,27 @@ fn prepare(options: &Options, given: Option<Scene>) -> Result<Job> {
     Ok(Job { mesh, tetrahedra, field, scene, load_ms, split_ms })
 }
 
-impl Options {
+impl Request {
+    /// The scene that the input is, if it is one.
+    pub(crate) fn scene(&self) -> Result<Option<Scene>> {
+        if !self.input.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
+            return Ok(None);
+        }
+        let scene = Scene::open(&self.input)?;
+        check_engine(&scene).with_context(|| self.input.display().to_string())?;
+        Ok(Some(scene))
+    }
+
+    /// The device that was asked for.
+    pub(crate) fn device(&self, scene: Option<&Scene>) -> DeviceChoice {
+        match (&self.device, scene.and_then(|s| s.device.as_ref())) {
+            (Some(name), _) => DeviceChoice::parse(name),
+            (None, Some(serde_json::Value::String(name))) => DeviceChoice::parse(name),
+            (None, Some(index)) => DeviceChoice::parse(&index.to_string()),
+            (None, None) => DeviceChoice::Auto,
+        }
+    }
+
     fn scalars(&self, scene: Option<&Scene>, mesh: &Mesh) -> Result<Scalars> {
         let association = self.association.map(|a| match a {
             Of::Point => Association::Point,
@@ -238,7 +258,7 @@ fn color_map(text: &str) -> Result<ColorMap> {
 }
 
 /// Refuses what a scene asks for and Halite has not: what options ask for, clap has checked.
-fn check_engine(scene: Option<&Scene>) -> Result<()> {
+fn check_engine(scene: &Scene) -> Result<()> {
     fn check<T: ValueEnum>(what: &str, name: &str) -> Result<()> {
         if T::from_str(name, true).is_err() {
             let known = T::value_variants().iter().filter_map(ValueEnum::to_possible_value);
@@ -247,7 +267,6 @@ fn check_engine(scene: Option<&Scene>) -> Result<()> {
         }
         Ok(())
     }
-    let Some(scene) = scene else { return Ok(()) };
     if let Some(name) = &scene.engine {
         check::<Engine>("engine", name)?;
     }
@@ -278,9 +297,17 @@ pub(crate) struct Drawn {
     pub(crate) image: Image,
     behind: Option<halite::scene::Backdrop>,
     stats: Stats,
-    load_ms: f64,
-    split_ms: f64,
-    first_frame_ms: f64,
+    times: Times,
+}
+
+/// What the renderer's own statistics do not tell, in ms.
+#[derive(Default)]
+pub(crate) struct Times {
+    pub(crate) load: f64,
+    pub(crate) split: f64,
+    pub(crate) first_frame: f64,
+    /// From a change of the transfer function to the frame that shows it.
+    pub(crate) transfer_edit: Option<f64>,
 }
 
 pub(crate) fn draw(job: Job, renderer: &mut Renderer) -> Result<Drawn> {
@@ -293,22 +320,27 @@ pub(crate) fn draw(job: Job, renderer: &mut Renderer) -> Result<Drawn> {
     drop((mesh, field));
     let start = Instant::now();
     let image = progress::during("drawing", |p| renderer.render(&view, p))?;
-    Ok(Drawn { image, behind, stats: renderer.stats().clone(), load_ms, split_ms, first_frame_ms: ms(start) })
+    let times = Times { load: load_ms, split: split_ms, first_frame: ms(start), transfer_edit: None };
+    Ok(Drawn { image, behind, stats: renderer.stats().clone(), times })
 }
 
 impl Drawn {
     fn report(&self) -> serde_json::Value {
-        let s = &self.stats;
-        serde_json::json!({
-            "engine": s.engine, "device": s.device, "adapter": s.adapter,
-            "size": self.image.size, "cells": s.cells, "tetrahedra": s.tetrahedra,
-            "load_ms": self.load_ms, "faces_ms": self.split_ms + s.faces_ms, "upload_ms": s.upload_ms,
-            "first_frame_ms": self.first_frame_ms, "frame_ms": s.frame_ms, "transfer_edit_ms": null,
-            "steps": s.steps, "repaired_rays": s.repaired_rays,
-            "device_ms": s.device_ms, "uploaded_bytes": s.uploaded_bytes, "device_bytes": s.device_bytes,
-            "peak_bytes": peak_bytes(),
-        })
+        report(&self.stats, &self.times, self.image.size, self.stats.frame_ms)
     }
+}
+
+/// What is told of frames that took `frame_ms`.
+pub(crate) fn report(s: &Stats, times: &Times, size: [u32; 2], frame_ms: f64) -> serde_json::Value {
+    serde_json::json!({
+        "engine": s.engine, "device": s.device, "adapter": s.adapter,
+        "size": size, "cells": s.cells, "tetrahedra": s.tetrahedra,
+        "load_ms": times.load, "faces_ms": times.split + s.faces_ms, "upload_ms": s.upload_ms,
+        "first_frame_ms": times.first_frame, "frame_ms": frame_ms, "transfer_edit_ms": times.transfer_edit,
+        "steps": s.steps, "repaired_rays": s.repaired_rays, "cpu_rays": s.cpu_rays,
+        "device_ms": s.device_ms, "uploaded_bytes": s.uploaded_bytes, "device_bytes": s.device_bytes,
+        "peak_bytes": peak_bytes(),
+    })
 }
 
 /// The most memory that this process ever held, where the system says so.
@@ -327,6 +359,6 @@ pub(crate) fn backdrop(background: Option<[f64; 3]>, behind: Option<&[[f32; 3]]>
     }
 }
 
-fn ms(start: Instant) -> f64 {
+pub(crate) fn ms(start: Instant) -> f64 {
     start.elapsed().as_secs_f64() * 1e3
 }

@@ -126,8 +126,8 @@ fn layouts_match_their_rust_twins() {
     check!("Knot", Knot, value slope s);
     check!("Function", Function, opacity color end scale);
     check!("Counts", RawCounts, steps carry repaired unused);
-    check!("Frame", Frame, origin direction size first_row rows offset near far planes has_ends leaves faces most_steps most_work);
-    check("Point", 12, &[0, 4, 8]);
+    check!("Frame", Frame, origin direction size first_row rows near far planes has_ends leaves faces most_steps most_work);
+    check("Point", 24, &[0, 4, 8, 12, 16, 20]);
 }
 
 /// Runs a kernel over `cases`, whose bindings are 0 and, for as many results, 1 of group 1.
@@ -169,11 +169,11 @@ struct Outcome { areas: vec4f, next: vec4f, entered: u32, dropped: u32 }
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= arrayLength(&cases) { return; }
-    let a = cases[id.x].points[0].xyz;
-    let b = cases[id.x].points[1].xyz;
-    let c = cases[id.x].points[2].xyz;
+    let a = cases[id.x].points[0];
+    let b = cases[id.x].points[1];
+    let c = cases[id.x].points[2];
     let areas = areas_of(a, b, c);
-    let stepped = step(Face(a, b, c, areas), cases[id.x].points[3].xyz);
+    let stepped = step(Face(a, b, c, areas), cases[id.x].points[3]);
     outcomes[id.x] = Outcome(vec4f(areas, 0.0), vec4f(stepped.areas, 0.0), u32(holds(a, b, c, areas)), stepped.dropped);
 }";
 
@@ -365,8 +365,14 @@ fn random_view(random: &mut Random, size: [u32; 2]) -> View {
     }
     if random.below(4) == 0 {
         let pixels = size[0] as usize * size[1] as usize;
-        let values = (0..pixels).map(|_| distance + random.within(-0.5, 1.0)).collect();
-        let kind = [DepthKind::Eye, DepthKind::Ray][random.below(2)];
+        let kind = [DepthKind::Eye, DepthKind::Ray, DepthKind::Window][random.below(3)];
+        let mut far = 1.0;
+        if kind == DepthKind::Window {
+            view = view.with_clipping_range([distance * 0.6, distance * 1.2]).unwrap();
+        } else {
+            far = distance + 0.5;
+        }
+        let values = (0..pixels).map(|_| far * random.within(0.5, 1.2)).collect();
         view = view.with_depth(DepthBuffer { kind, values }).unwrap();
     }
     view
@@ -415,8 +421,8 @@ fn draw(renderer: &mut Renderer, view: &View) -> Image {
     renderer.render(view, &|_| ()).unwrap()
 }
 
-/// Draws `frames` frames of each mesh on the device and on the CPU, and compares them. The device knows places to 1e-7 only,
-/// so that pixels may differ by more than 2e-5 where a function is as good as a step: one in a thousand, and by 5e-4.
+/// Draws `frames` frames of each mesh on the device and on the CPU, and compares them. The device interpolates values in f32, so
+/// that pixels may differ by more than 2e-5 where a function is as good as a step: one in ten thousand, and by 3e-4.
 fn compare(frames: usize, size: [u32; 2], seed: u64) {
     let Some(choice) = choice() else { return };
     let mut random = Random(seed);
@@ -451,22 +457,32 @@ fn compare(frames: usize, size: [u32; 2], seed: u64) {
             if apart > 2e-5 {
                 eprintln!("{what}");
             }
-            assert!(apart <= 5e-4, "{what} {transfer:?}");
+            assert!(apart <= 3e-4, "{what} {transfer:?}");
         }
     }
     eprintln!("{beyond} of {all} pixels are more than 2e-5 apart");
-    assert!(beyond * 1000 <= all);
+    assert!(beyond * 10_000 <= all);
 }
 
 #[test]
 fn the_twins_agree() {
-    compare(8, [48, 40], 11);
+    compare(5, [40, 36], 11);
 }
 
 #[test]
-#[ignore = "a thousand frames take minutes"]
 fn the_twins_agree_a_thousand_times() {
-    compare(125, [40, 40], 17);
+    if is_long() {
+        compare(125, [40, 40], 17);
+    }
+}
+
+/// Whether tests that take minutes were asked for.
+fn is_long() -> bool {
+    let asked = std::env::var_os("HALITE_LONG").is_some();
+    if !asked {
+        eprintln!("not run: HALITE_LONG is not set");
+    }
+    asked
 }
 
 #[test]
@@ -506,7 +522,43 @@ fn only_what_changed_is_handed_over() {
     let moved: Vec<DVec3> = mesh.points().iter().map(|p| *p * 0.5).collect();
     renderer.set_points(&moved).unwrap();
     let placed = bytes(&mut renderer) - still;
-    assert!(placed > 12 * points && placed < 12 * points + 100_000, "{placed}");
+    assert!(placed > 24 * points && placed < 24 * points + 100_000, "{placed}");
+}
+
+#[test]
+fn moved_points_are_drawn_where_they_are() {
+    let Some(choice) = choice() else { return };
+    let mesh = plain(generate::islands(8));
+    let to = |p: DVec3| DVec3::new(2.0 * p.x + 5.0, p.y + 0.3 * p.x, p.z - 7.0);
+    let moved = Mesh::new(
+        mesh.points().iter().map(|&p| to(p)).collect(),
+        mesh.cells().clone(),
+        mesh.point_arrays().to_vec(),
+        mesh.cell_arrays().to_vec(),
+    );
+    let mut random = Random(21);
+    let transfer = random_transfer(&mut random, false);
+    let camera = Camera {
+        position: to(DVec3::new(3.0, 2.0, 1.0)),
+        focal_point: to(DVec3::ZERO),
+        view_up: DVec3::Z,
+        projection: Projection::Perspective { view_angle: 50.0 },
+    };
+    let view = View::new(camera, [40, 40]).unwrap();
+    let moved = moved.unwrap();
+    let [got, want] = [(&mesh, choice), (&moved, DeviceChoice::Cpu)].map(|(mesh, choice)| {
+        let mut renderer = Renderer::with_device(0, choice).unwrap();
+        renderer.set_mesh(mesh, Tetrahedra::new(mesh).unwrap());
+        renderer.set_field(&Field::new(mesh, "scalar", Some(Association::Point), Component::All).unwrap()).unwrap();
+        renderer.set_transfer(&transfer);
+        draw(&mut renderer, &view);
+        renderer.set_points(moved.points()).unwrap();
+        draw(&mut renderer, &view)
+    });
+    assert!(want.pixels.iter().any(|p| p[3] > 0.1));
+    for (g, w) in got.pixels.iter().flatten().zip(want.pixels.iter().flatten()) {
+        assert!((g - w).abs() <= 2e-5, "{g}, not {w}");
+    }
 }
 
 #[test]
@@ -556,8 +608,10 @@ fn names_of_devices_are_parsed() {
 }
 
 #[test]
-#[ignore = "takes 4 GB and a minute"]
 fn ten_million_tetrahedra_are_drawn() {
+    if !is_long() {
+        return;
+    }
     let Some(choice) = choice() else { return };
     let mesh = generate::tetrahedra(119);
     let mut renderer = Renderer::with_device(0, choice).unwrap();

@@ -1,0 +1,164 @@
+use crate::render::{self, Job, Request, Times, ms};
+use crate::{output, progress};
+use anyhow::{Context, Result};
+use clap::Args;
+use halite::gpu::{self, DeviceChoice};
+use halite::render::{Renderer, Stats};
+use serde_json::{Value, json};
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Measure how long pictures take
+///
+/// Loads once, then draws the same view several times on the chosen device, and on each other device of this machine unless
+/// one was named. Times are medians.
+#[derive(Args)]
+pub(crate) struct Options {
+    #[command(flatten)]
+    request: Request,
+    /// Frames drawn on each device, besides the first
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    frames: u32,
+    /// Write the figures as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// Heads and widths of the table's columns: "on device" is the frame by the device's own clock.
+const COLUMNS: [(&str, usize); 9] = [
+    ("faces", 10),
+    ("field", 10),
+    ("first frame", 12),
+    ("frame", 10),
+    ("on device", 10),
+    ("edit", 10),
+    ("steps", 9),
+    ("rate", 10),
+    ("memory", 10),
+];
+
+/// What one device needed.
+struct Run {
+    stats: Stats,
+    times: Times,
+    frame_ms: f64,
+}
+
+pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
+    if let Some(path) = &options.json {
+        output::check(path)?;
+    }
+    let given = options.request.scene()?;
+    let choice = options.request.device(given.as_ref()).or_environment();
+    let mut renderer = Renderer::with_device(threads, choice.clone())?;
+    let job = renderer.install(|| render::prepare(&options.request, given))?;
+    let first = measure(options, &job, &mut renderer)?;
+    let mut runs = vec![first];
+    drop(renderer);
+    if choice == DeviceChoice::Auto {
+        for other in others(&runs[0].stats) {
+            let mut renderer = Renderer::with_device(threads, other)?;
+            match measure(options, &job, &mut renderer) {
+                Ok(run) => runs.push(run),
+                // One device that fails is no reason to keep the others' figures back.
+                Err(e) => tracing::warn!("{}: {e:#}", renderer.stats().adapter),
+            }
+        }
+    }
+    let size = job.scene.size;
+    output::print(&table(&runs, size))?;
+    if let Some(path) = &options.json {
+        let reports: Vec<Value> = runs.iter().map(|r| render::report(&r.stats, &r.times, size, r.frame_ms)).collect();
+        let mut whole = reports[0].clone();
+        whole["runs"] = json!(reports[1..]);
+        std::fs::write(path, format!("{whole:#}\n")).with_context(|| path.display().to_string())?;
+    }
+    Ok(())
+}
+
+/// The devices of this machine but the one that drew.
+fn others(drew: &Stats) -> Vec<DeviceChoice> {
+    let all = gpu::devices();
+    let mut seen = all.iter().position(|d| drew.device == "gpu" && d.name == drew.adapter);
+    let mut others: Vec<DeviceChoice> = Vec::new();
+    if drew.device == "gpu" {
+        others.push(DeviceChoice::Cpu);
+    }
+    for device in all.iter().filter(|d| d.lacks.is_none()) {
+        if seen == Some(device.index) {
+            seen = None;
+        } else {
+            others.push(DeviceChoice::Named(device.index.to_string()));
+        }
+    }
+    others
+}
+
+fn measure(options: &Options, job: &Job, renderer: &mut Renderer) -> Result<Run> {
+    let (view, _) = job.scene.view()?;
+    renderer.set_mesh(&job.mesh, job.tetrahedra.clone());
+    renderer.set_field(&job.field)?;
+    renderer.set_transfer(&job.scene.transfer);
+    let name = renderer.stats().adapter.clone();
+    progress::during("measuring", |p| {
+        let share = |done: u32| p(f64::from(done) / f64::from(2 * options.frames + 1));
+        let draw = |renderer: &mut Renderer| -> Result<f64> {
+            let start = Instant::now();
+            renderer.render(&view, &|_| ()).with_context(|| name.clone())?;
+            Ok(ms(start))
+        };
+        let first_frame = draw(renderer)?;
+        let (mut frames, mut edits) = (Vec::new(), Vec::new());
+        for i in 0..options.frames {
+            frames.push(draw(renderer)?);
+            share(2 * i + 2);
+            // The same function again: it has to be taken for a new one all the same.
+            renderer.set_transfer(&job.scene.transfer);
+            edits.push(draw(renderer)?);
+            share(2 * i + 3);
+        }
+        // What the device did for a still view, not for an edit.
+        draw(renderer)?;
+        let times =
+            Times { load: job.load_ms, split: job.split_ms, first_frame, transfer_edit: Some(median(&mut edits)) };
+        Ok(Run { stats: renderer.stats().clone(), times, frame_ms: median(&mut frames) })
+    })
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let (low, high) = (values[(values.len() - 1) / 2], values[values.len() / 2]);
+    (low + high) / 2.0
+}
+
+fn table(runs: &[Run], [w, h]: [u32; 2]) -> String {
+    let Stats { cells, tetrahedra, .. } = &runs[0].stats;
+    let times = &runs[0].times;
+    let mut text = format!(
+        "{w}x{h} pixels, {cells} cells, {tetrahedra} tetrahedra; loading {:.1} ms, splitting {:.1} ms\n\n",
+        times.load, times.split
+    );
+    for (head, width) in COLUMNS {
+        text += &format!("{head:>width$} ");
+    }
+    text += " device\n";
+    for Run { stats: s, times, frame_ms } in runs {
+        let time = |ms: f64| format!("{ms:.1} ms");
+        let cells = [
+            time(s.faces_ms),
+            time(s.upload_ms),
+            time(times.first_frame),
+            time(*frame_ms),
+            s.device_ms.map_or("-".into(), time),
+            time(times.transfer_edit.unwrap_or_default()),
+            format!("{:.2} M", s.steps as f64 / 1e6),
+            format!("{:.1} M/s", s.steps as f64 / frame_ms / 1e3),
+            format!("{:.1} MB", s.device_bytes as f64 / 1e6),
+        ];
+        for (cell, (_, width)) in cells.iter().zip(COLUMNS) {
+            text += &format!("{cell:>width$} ");
+        }
+        text += &format!(" {} on {}\n", s.engine, s.adapter);
+    }
+    text
+}
