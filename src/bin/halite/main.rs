@@ -8,6 +8,7 @@ mod output;
 mod parse;
 mod progress;
 mod render;
+mod variant;
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};

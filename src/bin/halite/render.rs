@@ -1,11 +1,12 @@
-use crate::{camera, choose, output, parse, progress};
+use crate::{camera, choose, output, parse, progress, variant};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use halite::field::{Association, Component, Field};
 use halite::gpu::DeviceChoice;
 use halite::image::{Backdrop, Image};
 use halite::mesh::{Mesh, cells, cells::Tetrahedra};
-use halite::render::{Renderer, Stats};
+use halite::project::Switches;
+use halite::render::{self, Renderer, Stats};
 use halite::scene::{Scalars, Scene};
 use halite::transfer::TransferFunction;
 use halite::transfer::colormap::ColorMap;
@@ -76,6 +77,8 @@ pub(crate) struct Options {
     /// How a ray is integrated in a cell
     #[arg(long, help_heading = "Engine")]
     integral: Option<Integral>,
+    #[command(flatten)]
+    variant: variant::Variant,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -90,11 +93,21 @@ enum Blending {
     Maximum,
 }
 
-/// One engine so far, so there is nothing to hand on.
 #[derive(Clone, Copy, ValueEnum)]
 enum Engine {
     Auto,
     Traverse,
+    Project,
+}
+
+impl From<Engine> for render::Engine {
+    fn from(engine: Engine) -> Self {
+        match engine {
+            Engine::Auto => render::Engine::Auto,
+            Engine::Traverse => render::Engine::Traverse,
+            Engine::Project => render::Engine::Project,
+        }
+    }
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -116,7 +129,11 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
         (None, Some(index)) => index.to_string(),
         (None, None) => "auto".into(),
     };
-    let mut renderer = Renderer::with_device(threads, DeviceChoice::parse(&device))?;
+    let named = given.as_ref().and_then(|scene| Engine::from_str(scene.engine.as_deref()?, true).ok());
+    let engine = options.engine.or(named).unwrap_or(Engine::Auto).into();
+    let mut renderer = Renderer::with_engine(threads, DeviceChoice::parse(&device), engine)?;
+    let switches = given.as_ref().map_or(Ok(Switches::default()), |s| variant::of_scene(s, &options.input))?;
+    renderer.set_switches(options.variant.apply(switches));
     let job = renderer.install(|| prepare(options, given))?;
     let background = job.scene.background;
     let drawn = draw(job, &mut renderer)?;
@@ -306,7 +323,7 @@ impl Drawn {
             "first_frame_ms": self.first_frame_ms, "frame_ms": s.frame_ms, "transfer_edit_ms": null,
             "steps": s.steps, "repaired_rays": s.repaired_rays,
             "device_ms": s.device_ms, "uploaded_bytes": s.uploaded_bytes, "device_bytes": s.device_bytes,
-            "peak_bytes": peak_bytes(),
+            "peak_bytes": peak_bytes(), "projection": s.projection,
         })
     }
 }
