@@ -3,7 +3,10 @@
 //! Nothing here panics or aborts when a device fails: its first fault is kept, and [`Gpu::check`] tells it.
 
 pub(crate) mod buffers;
+pub(crate) mod function;
+pub(crate) mod raster;
 pub(crate) mod shader;
+pub(crate) mod sort;
 
 use crate::error::{Error, Result};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -61,7 +64,11 @@ pub struct Description {
 const REQUIRED: wgpu::Features = wgpu::Features::empty();
 
 /// Features that are used where there are any.
-const OPTIONAL: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY;
+const OPTIONAL: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY
+    .union(wgpu::Features::PIPELINE_STATISTICS_QUERY)
+    .union(wgpu::Features::FLOAT32_BLENDABLE)
+    .union(wgpu::Features::FLOAT32_FILTERABLE)
+    .union(wgpu::Features::TEXTURE_FORMAT_16BIT_NORM);
 
 /// Storage buffers per shader and bytes per storage buffer without which an adapter is of no use.
 const LIMITS: (u32, u64) = (16, 128 << 20);

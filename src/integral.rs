@@ -14,6 +14,7 @@
 
 mod batch;
 mod knots;
+pub mod table;
 
 pub use batch::Batch;
 pub(crate) use knots::BUCKETS;

@@ -21,6 +21,8 @@ pub mod image;
 pub mod integral;
 pub mod io;
 pub mod mesh;
+pub mod order;
+pub mod project;
 pub mod real;
 pub mod reference;
 pub mod render;

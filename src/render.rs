@@ -8,6 +8,7 @@ use crate::integral::Exact;
 use crate::mesh::Mesh;
 use crate::mesh::cells::Tetrahedra;
 use crate::mesh::faces::Faces;
+use crate::project::{self, Switches, gpu::Project};
 use crate::transfer::TransferFunction;
 use crate::traverse::gpu::{Part, Traverse};
 use crate::traverse::{Geometry, Values, cpu};
@@ -16,6 +17,18 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::time::Instant;
 
+/// How frames are drawn.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Engine {
+    /// The one that suits most: today always [`Engine::Traverse`].
+    #[default]
+    Auto,
+    /// Rays walk from cell to cell; exact for every mesh. See [`crate::traverse`].
+    Traverse,
+    /// Cells are sorted by depth, projected and blended; needs a graphics device, be it in software. See [`crate::project`].
+    Project,
+}
+
 /// Draws one mesh, as often as wanted; keeps what did not change between frames.
 #[derive(Debug)]
 pub struct Renderer {
@@ -23,6 +36,9 @@ pub struct Renderer {
     choice: DeviceChoice,
     /// None where the CPU draws.
     device: Option<Traverse>,
+    /// What draws instead, if the engine is [`Engine::Project`].
+    project: Option<Project>,
+    switches: Switches,
     mesh: Option<Loaded>,
     field: Option<Prepared>,
     transfer: Option<TransferFunction>,
@@ -56,7 +72,7 @@ enum AnyValues {
 /// What a renderer did and how long it took.
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub struct Stats {
-    /// Name of the engine: "traverse".
+    /// Name of the engine: "traverse" or "project".
     pub engine: String,
     /// "cpu" or "gpu".
     pub device: String,
@@ -84,6 +100,23 @@ pub struct Stats {
     pub uploaded_bytes: u64,
     /// The last frame by the device's own clock, in ms, where it has one.
     pub device_ms: Option<f64>,
+    /// What the projection engine did.
+    pub projection: Option<ProjectionStats>,
+}
+
+/// What the projection engine did in the last frame.
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize)]
+pub struct ProjectionStats {
+    /// Cells that were drawn; parts count, where a cell is drawn in parts.
+    pub drawn_cells: u64,
+    /// Finding the cells that are seen and sorting them, in ms; 0 if the camera stood still.
+    pub order_ms: f64,
+    /// Projecting them, by the device's own clock, in ms, where it has one.
+    pub project_ms: Option<f64>,
+    /// Drawing them, likewise.
+    pub draw_ms: Option<f64>,
+    /// Fragments that were computed, where the device counts them.
+    pub fragments: Option<u64>,
 }
 
 impl Renderer {
@@ -101,22 +134,41 @@ impl Renderer {
     /// [`Error::Render`] if the threads cannot be started; [`Error::Device`] if the device is none of this machine's, or
     /// cannot be used. With [`DeviceChoice::Auto`] the CPU draws then.
     pub fn with_device(threads: usize, choice: DeviceChoice) -> Result<Self> {
+        Self::with_engine(threads, choice, Engine::Auto)
+    }
+
+    /// A renderer on `threads` threads of its own and the chosen device, which draws with `engine`.
+    ///
+    /// # Errors
+    /// As [`Self::with_device`]; and [`Error::Device`] if the engine is [`Engine::Project`] and there is no graphics device.
+    pub fn with_engine(threads: usize, choice: DeviceChoice, engine: Engine) -> Result<Self> {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .thread_name(|i| format!("halite-{i}"))
             .build()
             .map_err(|e| Error::Render(format!("cannot start {threads} threads: {e}")))?;
         let choice = choice.or_environment();
-        let device = match Gpu::open(&choice) {
+        let project = if engine == Engine::Project { Some(Project::open(&choice)?) } else { None };
+        let device = match if project.is_some() { Ok(None) } else { Gpu::open(&choice) } {
             Err(e) if choice == DeviceChoice::Auto => {
                 tracing::warn!("drawing on the CPU: {e}");
                 None
             }
             opened => opened?.map(Traverse::new),
         };
-        let stats = Stats { engine: "traverse".into(), ..Stats::default() };
-        let mut renderer =
-            Renderer { pool, choice, device, mesh: None, field: None, transfer: None, exact: None, stats };
+        let stats = Stats { engine: if project.is_some() { "project" } else { "traverse" }.into(), ..Stats::default() };
+        let mut renderer = Renderer {
+            pool,
+            choice,
+            device,
+            project,
+            switches: Switches::default(),
+            mesh: None,
+            field: None,
+            transfer: None,
+            exact: None,
+            stats,
+        };
         renderer.name_device();
         Ok(renderer)
     }
@@ -126,9 +178,15 @@ impl Renderer {
         self.device.as_mut()
     }
 
+    #[cfg(test)]
+    pub(crate) fn project(&mut self) -> Option<&mut Project> {
+        self.project.as_mut()
+    }
+
     fn name_device(&mut self) {
-        (self.stats.device, self.stats.adapter) = match &self.device {
-            Some(traverse) => ("gpu".into(), traverse.gpu().adapter.name.clone()),
+        let gpu = self.project.as_ref().map(Project::gpu).or(self.device.as_ref().map(Traverse::gpu));
+        (self.stats.device, self.stats.adapter) = match gpu {
+            Some(gpu) => ("gpu".into(), gpu.adapter.name.clone()),
             None => ("cpu".into(), format!("{} threads", self.pool.current_num_threads())),
         };
     }
@@ -140,6 +198,15 @@ impl Renderer {
             traverse.forget(part);
             traverse.forget(Part::Function);
         }
+        if let Some(project) = &mut self.project {
+            project.forget(part);
+            project.forget(Part::Function);
+        }
+    }
+
+    /// Draws with other variants of the projection engine from now on; nothing to other engines.
+    pub fn set_switches(&mut self, switches: Switches) {
+        self.switches = switches;
     }
 
     /// Runs `work`, such as reading a file, on the renderer's threads.
@@ -150,7 +217,12 @@ impl Renderer {
     /// Draws another mesh from now on, split into `tetrahedra`; the field must be set again.
     pub fn set_mesh(&mut self, mesh: &Mesh, tetrahedra: Tetrahedra) {
         let start = Instant::now();
+        // Projected cells need no neighbours.
+        let connected = self.project.is_none();
         let geometry = self.pool.install(|| {
+            if !connected {
+                return Geometry::unconnected(mesh.points(), &tetrahedra);
+            }
             let faces = Faces::new(mesh.points(), &tetrahedra.corners);
             Geometry::new(mesh.points(), &tetrahedra, &faces)
         });
@@ -176,6 +248,9 @@ impl Renderer {
         self.pool.install(|| mesh.geometry.set_points(points));
         if let Some(traverse) = &mut self.device {
             traverse.forget(Part::Points);
+        }
+        if let Some(project) = &mut self.project {
+            project.forget(Part::Points);
         }
         Ok(())
     }
@@ -219,12 +294,19 @@ impl Renderer {
     /// and [`Error::Device`] if it refuses them, unless it was not named.
     pub fn render(&mut self, view: &View, progress: &(dyn Fn(f64) + Sync)) -> Result<Image> {
         match self.try_render(view, progress) {
+            Err(Error::Lost(why)) if self.project.is_some() => {
+                tracing::warn!("{why}; opening it again");
+                self.project = Some(Project::open(&self.choice)?);
+                return self.try_render(view, progress);
+            }
             Err(Error::Lost(why)) => {
                 self.device = Gpu::open(&self.choice).unwrap_or_default().map(Traverse::new);
                 self.name_device();
                 tracing::warn!("{why}; now drawing on {} ({})", self.stats.device, self.stats.adapter);
             }
-            Err(e @ (Error::Memory { .. } | Error::Device(_))) if self.choice == DeviceChoice::Auto => {
+            Err(e @ (Error::Memory { .. } | Error::Device(_)))
+                if self.choice == DeviceChoice::Auto && self.project.is_none() =>
+            {
                 self.draw_on_cpu(&e);
             }
             done => return done,
@@ -256,6 +338,25 @@ impl Renderer {
             AnyValues::Rgba(_) => Kind::Rgba,
         };
         let exact = self.exact.get_or_insert_with(|| Exact::new(transfer, kind, &field.normal, mesh.geometry.scale));
+        if let Some(project) = &mut self.project {
+            let uploaded = project.gpu().uploaded();
+            let (geometry, switches) = (&mesh.geometry, &self.switches);
+            let precise = || Exact::<f64>::new(transfer, kind, &field.normal, geometry.scale);
+            let (pixels, counts) = self.pool.install(|| match &field.values {
+                AnyValues::Scalar(v) => project.render(geometry, v, exact, &precise, view, switches),
+                AnyValues::Pair(v) => project.render(geometry, v, exact, &precise, view, switches),
+                AnyValues::Rgba(v) => project.render(geometry, v, exact, &precise, view, switches),
+            })?;
+            progress(1.0);
+            self.stats.uploaded_bytes = project.gpu().uploaded() - uploaded;
+            self.stats.device_bytes = project.gpu().allocated();
+            let project::Counts { records, order_ms, project_ms, draw_ms, fragments } = counts;
+            self.stats.projection =
+                Some(ProjectionStats { drawn_cells: records, order_ms, project_ms, draw_ms, fragments });
+            self.stats.device_ms = project_ms.zip(draw_ms).map(|(p, d)| p + d);
+            self.stats.frame_ms = ms(start);
+            return Ok(Image { size: view.size(), pixels });
+        }
         let frame = Frame { mesh, field, transfer, exact, view, progress };
         let device = &mut self.device;
         let uploaded = device.as_ref().map_or(0, |t| t.gpu().uploaded());

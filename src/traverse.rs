@@ -93,6 +93,12 @@ impl Geometry {
         Geometry { centre, scale, points, cells, boundary, point_of, tetrahedron_of, welded: faces.weld.is_some() }
     }
 
+    /// Prepares `tetrahedra` for engines that do not walk: cells have no neighbours, and there is no boundary.
+    pub fn unconnected(points: &[DVec3], tetrahedra: &Tetrahedra) -> Self {
+        let neighbours = vec![[BOUNDARY; 4]; tetrahedra.corners.len()];
+        Self::new(points, tetrahedra, &Faces { neighbours, ..Faces::default() })
+    }
+
     /// Moves the points: `points` are the mesh's, in world coordinates. Cells keep their neighbours, so none may turn inside
     /// out, and points that shared a position still must.
     pub fn set_points(&mut self, points: &[DVec3]) {

@@ -60,6 +60,22 @@ impl<R: Real> Knots<R> {
         self.s.is_empty()
     }
 
+    /// Channel `k` at `s`.
+    pub(crate) fn color_at(&self, s: R, k: usize) -> R {
+        let i = self.interval(s);
+        self.value[i][k] + self.slope[i][k] * (s - self.s[i])
+    }
+
+    /// Whether anything between `low` and `high` has extinction, or, if `direct`, a colour.
+    pub(crate) fn shows(&self, low: f32, high: f32, direct: bool) -> bool {
+        let channels = if direct { 4 } else { 1 };
+        let first = self.s.partition_point(|&k| k < R::of(f64::from(low))).max(1) - 1;
+        let beyond = self.s.partition_point(|&k| k <= R::of(f64::from(high)));
+        let positive = |v: &[R; 4]| v[..channels].iter().any(|&c| c > R::of(0.0));
+        // Linear in between: from the knot below to the one above.
+        self.value[first..(beyond + 1).min(self.value.len())].iter().any(positive)
+    }
+
     /// The interval that `s` lies in: the last whose lower end is not above it.
     #[inline(always)]
     fn interval(&self, s: R) -> usize {

@@ -50,14 +50,16 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     }
     let given = options.request.scene()?;
     let choice = options.request.device(given.as_ref()).or_environment();
-    let mut renderer = Renderer::with_device(threads, choice.clone())?;
+    // Engine and switches of a scene hold for all devices.
+    let scene = given.clone();
+    let mut renderer = options.request.renderer(threads, scene.as_ref(), choice.clone())?;
     let job = renderer.install(|| render::prepare(&options.request, given))?;
     let first = measure(options, &job, &mut renderer)?;
     let mut runs = vec![first];
     drop(renderer);
     if choice == DeviceChoice::Auto {
         for other in others(&runs[0].stats) {
-            let mut renderer = Renderer::with_device(threads, other)?;
+            let mut renderer = options.request.renderer(threads, scene.as_ref(), other)?;
             match measure(options, &job, &mut renderer) {
                 Ok(run) => runs.push(run),
                 // One device that fails is no reason to keep the others' figures back.
@@ -81,7 +83,8 @@ fn others(drew: &Stats) -> Vec<DeviceChoice> {
     let all = gpu::devices();
     let mut seen = all.iter().position(|d| drew.device == "gpu" && d.name == drew.adapter);
     let mut others: Vec<DeviceChoice> = Vec::new();
-    if drew.device == "gpu" {
+    // Only one engine knows how to do without a graphics device.
+    if drew.device == "gpu" && drew.engine == "traverse" {
         others.push(DeviceChoice::Cpu);
     }
     for device in all.iter().filter(|d| d.lacks.is_none()) {

@@ -9,6 +9,7 @@ mod output;
 mod parse;
 mod progress;
 mod render;
+mod variant;
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};

@@ -1,11 +1,12 @@
-use crate::{camera, choose, output, parse, progress};
+use crate::{camera, choose, output, parse, progress, variant};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use halite::field::{Association, Component, Field};
 use halite::gpu::DeviceChoice;
 use halite::image::{Backdrop, Image};
 use halite::mesh::{Mesh, cells, cells::Tetrahedra};
-use halite::render::{Renderer, Stats};
+use halite::project::Switches;
+use halite::render::{self, Renderer, Stats};
 use halite::scene::{Scalars, Scene};
 use halite::transfer::TransferFunction;
 use halite::transfer::colormap::ColorMap;
@@ -83,6 +84,8 @@ pub(crate) struct Request {
     /// How a ray is integrated in a cell
     #[arg(long, help_heading = "Engine")]
     integral: Option<Integral>,
+    #[command(flatten)]
+    variant: variant::Variant,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -97,11 +100,21 @@ enum Blending {
     Maximum,
 }
 
-/// One engine so far, so there is nothing to hand on.
 #[derive(Clone, Copy, ValueEnum)]
 enum Engine {
     Auto,
     Traverse,
+    Project,
+}
+
+impl From<Engine> for render::Engine {
+    fn from(engine: Engine) -> Self {
+        match engine {
+            Engine::Auto => render::Engine::Auto,
+            Engine::Traverse => render::Engine::Traverse,
+            Engine::Project => render::Engine::Project,
+        }
+    }
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -116,7 +129,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     }
     let request = &options.request;
     let given = request.scene()?;
-    let mut renderer = Renderer::with_device(threads, request.device(given.as_ref()))?;
+    let mut renderer = request.renderer(threads, given.as_ref(), request.device(given.as_ref()))?;
     let job = renderer.install(|| prepare(request, given))?;
     let background = job.scene.background;
     let drawn = draw(job, &mut renderer)?;
@@ -197,6 +210,16 @@ impl Request {
             (None, Some(index)) => DeviceChoice::parse(&index.to_string()),
             (None, None) => DeviceChoice::Auto,
         }
+    }
+
+    /// A renderer on `device`, with the engine and its switches that were asked for.
+    pub(crate) fn renderer(&self, threads: usize, scene: Option<&Scene>, device: DeviceChoice) -> Result<Renderer> {
+        let named = scene.and_then(|s| Engine::from_str(s.engine.as_deref()?, true).ok());
+        let engine = self.engine.or(named).unwrap_or(Engine::Auto).into();
+        let mut renderer = Renderer::with_engine(threads, device, engine)?;
+        let switches = scene.map_or(Ok(Switches::default()), |s| variant::of_scene(s, &self.input))?;
+        renderer.set_switches(self.variant.apply(switches));
+        Ok(renderer)
     }
 
     fn scalars(&self, scene: Option<&Scene>, mesh: &Mesh) -> Result<Scalars> {
@@ -339,7 +362,7 @@ pub(crate) fn report(s: &Stats, times: &Times, size: [u32; 2], frame_ms: f64) ->
         "first_frame_ms": times.first_frame, "frame_ms": frame_ms, "transfer_edit_ms": times.transfer_edit,
         "steps": s.steps, "repaired_rays": s.repaired_rays, "cpu_rays": s.cpu_rays,
         "device_ms": s.device_ms, "uploaded_bytes": s.uploaded_bytes, "device_bytes": s.device_bytes,
-        "peak_bytes": peak_bytes(),
+        "peak_bytes": peak_bytes(), "projection": s.projection,
     })
 }
 

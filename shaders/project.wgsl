@@ -1,0 +1,82 @@
+// What all programs of the projection share: the frame, its rays, and what limits them.
+
+/// All rays of a frame, as in traverse.wgsl, but seen from `base`: the place where the middle one starts. Coordinates are the
+/// mesh's normalised ones, relative to it.
+struct Frame {
+    /// The base as the sum of two numbers, the second much smaller.
+    base: vec4f,
+    base_low: vec4f,
+    /// dot(across[k], p) over the depth of p is its place in the image, in [−1, 1].
+    across: array<vec4f, 2>,
+    /// The view direction, of unit length; w: the depth of the base, in perspective views.
+    forward: vec4f,
+    /// The ray at (x, y) starts at x origin[0] + y origin[1] and runs along direction · (1, x, y).
+    origin: array<vec4f, 2>,
+    direction: array<vec4f, 3>,
+    /// Width and height of the image, in pixels.
+    size: vec2f,
+    /// From a pixel's centre to its sample, in units of x and y.
+    offset: vec2f,
+    /// The part of a ray that is seen, in lengths of its direction.
+    near: f32,
+    far: f32,
+    /// Cells with a corner that is not this deep are special, in perspective views.
+    nearest: f32,
+    /// 1 in perspective views, 0 in parallel ones.
+    perspective: u32,
+    planes: u32,
+    /// Whether `ends` holds a value for each pixel of the image.
+    has_ends: u32,
+    /// The cells and parts of cells of a whole frame.
+    records: u32,
+    unused: u32,
+}
+
+@group(0) @binding(3) var<uniform> frame: Frame;
+/// Clipping planes: dot(p, plane.xyz) + plane.w ≥ 0 is kept.
+@group(0) @binding(4) var<storage, read> planes: array<vec4f>;
+/// Where each ray ends, for want of something nearer.
+@group(0) @binding(5) var<storage, read> ends: array<f32>;
+
+/// Place in the image times depth, and depth: (x w, y w, w).
+fn seen(p: vec3f) -> vec3f {
+    let depth = fma(p.x, frame.forward.x, fma(p.y, frame.forward.y, fma(p.z, frame.forward.z, frame.forward.w)));
+    let x = fma(p.x, frame.across[0].x, fma(p.y, frame.across[0].y, p.z * frame.across[0].z));
+    let y = fma(p.x, frame.across[1].x, fma(p.y, frame.across[1].y, p.z * frame.across[1].z));
+    return vec3f(x, y, select(1.0, depth, frame.perspective == 1u));
+}
+
+/// Where in the image, in [−1, 1] from its middle to its edges, the pixel with the centre `at` has its sample.
+fn sample_of(at: vec2f) -> vec2f {
+    return vec2f(2.0 * at.x - frame.size.x, frame.size.y - 2.0 * at.y) / frame.size + frame.offset;
+}
+
+fn direction_at(xy: vec2f) -> vec3f {
+    return fma(frame.direction[2].xyz, vec3f(xy.y), fma(frame.direction[1].xyz, vec3f(xy.x), frame.direction[0].xyz));
+}
+
+fn origin_at(xy: vec2f) -> vec3f {
+    return fma(frame.origin[1].xyz, vec3f(xy.y), frame.origin[0].xyz * xy.x);
+}
+
+/// The part of a ray that is seen: of the pixel with the centre `at`, from `origin` along a unit vector of which the frame's
+/// directions are `stretch` lengths.
+fn limits_of(at: vec2f, origin: vec3f, along: vec3f, stretch: f32) -> vec2f {
+    var limits = vec2f(frame.near, frame.far) * stretch;
+    if frame.has_ends != 0u {
+        limits.y = min(limits.y, ends[u32(at.y) * u32(frame.size.x) + u32(at.x)]);
+    }
+    for (var k = 0u; k < frame.planes; k++) {
+        let height = dot(origin, planes[k].xyz) + planes[k].w;
+        let slope = dot(along, planes[k].xyz);
+        let t = -height / slope;
+        if slope > 0.0 {
+            limits.x = max(limits.x, t);
+        } else if slope < 0.0 {
+            limits.y = min(limits.y, t);
+        } else if height < 0.0 {
+            limits.y = -FAR;
+        }
+    }
+    return limits;
+}

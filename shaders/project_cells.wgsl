@@ -1,0 +1,185 @@
+// The compute stages: which cells are seen and how deep (`classify`), and what is drawn of each (`project`).
+
+/// A part of the cells, or of the order.
+struct Part {
+    first: u32,
+    count: u32,
+    /// Invocations of one row of the dispatch.
+    row: u32,
+    /// The place of the first in the whole order.
+    rank: u32,
+}
+
+/// High and low parts of the normalised coordinates.
+struct Point {
+    x: f32, y: f32, z: f32,
+    u: f32, v: f32, w: f32,
+}
+
+@group(2) @binding(0) var<uniform> part: Part;
+/// The number of parts of the values' range, of FILLED equal ones, below each in which the function is not empty.
+@group(2) @binding(1) var<storage, read> filled: array<u32>;
+@group(2) @binding(2) var<storage, read_write> keys: array<u32>;
+/// Cells from back to front. What is drawn of them starts at the third: the first two are those before.
+@group(2) @binding(3) var<storage, read> order: array<u32>;
+@group(2) @binding(4) var<storage, read_write> records: array<Record>;
+
+fn place(i: u32) -> vec3f {
+    let p = points(i);
+    return (vec3f(p.x, p.y, p.z) - frame.base.xyz) + (vec3f(p.u, p.v, p.w) - frame.base_low.xyz);
+}
+
+fn places(cell: vec4u) -> array<vec3f, 4> {
+    return array<vec3f, 4>(place(cell.x), place(cell.y), place(cell.z), place(cell.w));
+}
+
+fn values_of(cell: u32, corners: vec4u) -> array<Value, 4> {
+    if ASSOCIATION == POINT {
+        return array<Value, 4>(values(corners.x), values(corners.y), values(corners.z), values(corners.w));
+    } else if ASSOCIATION == CORNER {
+        return array<Value, 4>(values(4u * cell), values(4u * cell + 1u), values(4u * cell + 2u), values(4u * cell + 3u));
+    }
+    let v = values(cell);
+    return array<Value, 4>(v, v, v, v);
+}
+
+/// Whether the function may show something of values between two.
+fn shows(low: f32, high: f32) -> bool {
+    // One part more on both sides than needed: rounding.
+    let first = clamp(i32((low + 1.0) * (f32(FILLED) / 2.0)) - 1, 0, i32(FILLED) - 1);
+    let last = clamp(i32((high + 1.0) * (f32(FILLED) / 2.0)) + 1, 0, i32(FILLED) - 1);
+    return filled[last + 1] > filled[first];
+}
+
+/// The centre of the sphere through the corners, from the first of them; not finite for flat cells.
+fn circumcentre(p: array<vec3f, 4>) -> vec3f {
+    let b = p[1] - p[0];
+    let c = p[2] - p[0];
+    let d = p[3] - p[0];
+    return (dot(b, b) * cross(c, d) + dot(c, c) * cross(d, b) + dot(d, d) * cross(b, c)) / (2.0 * dot(b, cross(c, d)));
+}
+
+/// A key that falls as the depth rises; HIDDEN if nothing of the cell is seen.
+fn key_of(cell: u32) -> u32 {
+    let corners = cells(cell);
+    let v = values_of(cell, corners);
+    if !(is_visible(v[0]) && is_visible(v[1]) && is_visible(v[2]) && is_visible(v[3])) {
+        return HIDDEN;
+    }
+    let s = vec4f(last_of(v[0]), last_of(v[1]), last_of(v[2]), last_of(v[3]));
+    if !shows(min(min(s.x, s.y), min(s.z, s.w)), max(max(s.x, s.y), max(s.z, s.w))) {
+        return HIDDEN;
+    }
+    let p = places(corners);
+    let a = seen(p[0]);
+    let b = seen(p[1]);
+    let c = seen(p[2]);
+    let d = seen(p[3]);
+    let x = vec4f(a.x, b.x, c.x, d.x);
+    let y = vec4f(a.y, b.y, c.y, d.y);
+    let w = vec4f(a.z, b.z, c.z, d.z);
+    // Beside the image, behind the eye, or cut off.
+    let edge = vec2f(1.0) + abs(frame.offset) + 4.0 / frame.size;
+    let z = vec4f(dot(p[0], frame.forward.xyz), dot(p[1], frame.forward.xyz), dot(p[2], frame.forward.xyz), dot(p[3], frame.forward.xyz));
+    if all(x > edge.x * w) || all(x < -edge.x * w) || all(y > edge.y * w) || all(y < -edge.y * w)
+        || all(w <= vec4f(0.0)) || all(z < vec4f(frame.near)) || all(z > vec4f(frame.far)) {
+        return HIDDEN;
+    }
+    for (var k = 0u; k < frame.planes; k++) {
+        let n = planes[k].xyz;
+        if all(vec4f(dot(p[0], n), dot(p[1], n), dot(p[2], n), dot(p[3], n)) + planes[k].w < vec4f(0.0)) {
+            return HIDDEN;
+        }
+    }
+    let is_near = any(w < vec4f(frame.nearest));
+    if !is_near {
+        // Between the centres of pixels.
+        let left = (x / w - frame.offset.x + 1.0) * (0.5 * frame.size.x);
+        let down = (1.0 + frame.offset.y - y / w) * (0.5 * frame.size.y);
+        let low = ceil(vec2f(min(min(left.x, left.y), min(left.z, left.w)), min(min(down.x, down.y), min(down.z, down.w))) - 0.5 - 2.0 * GROWTH);
+        let high = floor(vec2f(max(max(left.x, left.y), max(left.z, left.w)), max(max(down.x, down.y), max(down.z, down.w))) - 0.5 + 2.0 * GROWTH);
+        if any(low > high) {
+            return HIDDEN;
+        }
+    }
+    // Of the squared distance from the eye, with a sphere's radius taken away; its digits are kept where the eye is far.
+    var middle = (p[0] + p[1] + p[2] + p[3]) * 0.25;
+    var radius = 0.0;
+    if BY_SPHERE {
+        let centre = circumcentre(p);
+        let square = dot(centre, centre);
+        if square < FAR {
+            middle = p[0] + centre;
+            radius = square;
+        }
+    }
+    var depth = dot(middle, frame.forward.xyz);
+    if frame.perspective == 1u {
+        depth = (dot(middle, middle) - radius + 2.0 * frame.forward.w * depth) / max(2.0 * frame.forward.w, 1.0);
+    }
+    let bits = bitcast<u32>(depth);
+    let ascending = select(bits | 0x80000000u, ~bits, (bits >> 31u) == 1u);
+    // No finite depth gives HIDDEN.
+    return (~ascending & ~IN_PARTS) | select(0u, IN_PARTS, is_near && FORM != INTERSECTED);
+}
+
+@compute @workgroup_size(64)
+fn classify(@builtin(global_invocation_id) id: vec3u) {
+    let i = id.y * part.row + id.x;
+    if i < part.count {
+        keys[i] = key_of(part.first + i);
+    }
+}
+
+@compute @workgroup_size(64)
+fn project_all(@builtin(global_invocation_id) id: vec3u) {
+    let i = id.y * part.row + id.x;
+    if i >= part.count {
+        return;
+    }
+    let at = part.first + i;
+    let cell = order[at];
+    var piece = 0u;
+    if FORM != INTERSECTED {
+        // A cell that is drawn in parts comes once for each.
+        if order[at - 1u] == cell {
+            piece = select(1u, 2u, order[at - 2u] == cell);
+        }
+    }
+    let corners = cells(cell);
+    records[i] = record_of(places(corners), values_of(cell, corners), piece, part.rank + i);
+}
+
+/// How the four directions from the eye to the corners depend on each other: Σ a p = 0, the sum of a being six volumes. For a
+/// parallel view, of the projected corners. (Kraus, Qiao & Ebert 2004 call for the thick vertex; this is it, for all cases.)
+fn dependency(p: array<vec3f, 4>) -> vec4f {
+    let b = p[1] - p[0];
+    let c = p[2] - p[0];
+    let d = p[3] - p[0];
+    let normals = array<vec3f, 3>(cross(c, d), cross(d, b), cross(b, c));
+    let from_eye = select(frame.forward.xyz, p[0] + frame.forward.xyz * frame.forward.w, frame.perspective == 1u);
+    let rest = -vec3f(dot(from_eye, normals[0]), dot(from_eye, normals[1]), dot(from_eye, normals[2]));
+    let volume = select(0.0, dot(b, normals[0]), frame.perspective == 1u);
+    return vec4f(volume - rest.x - rest.y - rest.z, rest);
+}
+
+/// The corners on the outline of a cell with this dependency, in sequence around it; three have the first again as fourth.
+fn outline(a: vec4f) -> vec4u {
+    // The side of fewer corners first: one is inside the outline, two are opposite corners of it.
+    let positive = a > vec4f(0.0);
+    let count = u32(positive.x) + u32(positive.y) + u32(positive.z) + u32(positive.w);
+    let few = select(positive, !positive, vec4<bool>(count > 2u));
+    if count == 2u {
+        let i = select(select(select(3u, 2u, few.z), 1u, few.y), 0u, few.x);
+        let j = select(select(select(0u, 1u, few.y), 2u, few.z), 3u, few.w);
+        let others = 6u - i - j;
+        // The other two, of which the sum and the product with what is left decide: the smallest index that is free, and the rest.
+        var k = 0u;
+        while k == i || k == j {
+            k++;
+        }
+        return vec4u(i, k, j, others - k);
+    }
+    let inside = select(select(select(3u, 2u, few.z), 1u, few.y), 0u, few.x);
+    return select(select(select(vec4u(0u, 1u, 2u, 0u), vec4u(0u, 1u, 3u, 0u), inside == 2u), vec4u(0u, 2u, 3u, 0u), inside == 1u), vec4u(1u, 2u, 3u, 1u), inside == 0u);
+}

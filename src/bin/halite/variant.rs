@@ -1,0 +1,75 @@
+//! The switches of the projection engine, as options and in scenes.
+
+use anyhow::{Context, Result};
+use clap::Args;
+use halite::project::{Coloring, Compositing, Fragments, Order, Switches, Target, Texels, Thickness};
+use halite::scene::Scene;
+use serde::de::{DeserializeOwned, IntoDeserializer};
+use std::path::Path;
+
+/// What of the projection engine's variant somebody said.
+#[derive(Args)]
+pub(crate) struct Variant {
+    /// Where a fragment's values come from: intersected, interpolated, or linear (wrong in perspective)
+    #[arg(long, value_name = "FORM", value_parser = named::<Fragments>, help_heading = "Projection engine")]
+    fragments: Option<Fragments>,
+    /// How long a ray's way through an interpolated cell is: distance, or depth
+    #[arg(long, value_name = "KIND", value_parser = named::<Thickness>, help_heading = "Projection engine")]
+    thickness: Option<Thickness>,
+    /// In which sequence cells are drawn: depth, circumsphere (exact for Delaunay meshes), or none
+    #[arg(long, value_name = "KIND", value_parser = named::<Order>, help_heading = "Projection engine")]
+    order: Option<Order>,
+    /// What cells are blended into: rgba32float, rgba16float or rgba8
+    #[arg(long, value_name = "FORMAT", value_parser = named::<Target>, help_heading = "Projection engine")]
+    target: Option<Target>,
+    /// Round opacities at random when they are blended into rgba8
+    #[arg(long, help_heading = "Projection engine")]
+    dither: bool,
+    /// How a cell joins what lies behind it: over, or additive
+    #[arg(long, value_name = "KIND", value_parser = named::<Compositing>, help_heading = "Projection engine")]
+    compositing: Option<Compositing>,
+    /// Where colour and opacity come from: exact, or a table: uniform, log or log-normalised
+    #[arg(long, value_name = "KIND", value_parser = named::<Coloring>, help_heading = "Projection engine")]
+    coloring: Option<Coloring>,
+    /// Values in front, values behind and lengths of the table [default: 256x256x16]
+    #[arg(long, value_name = "NxNxN", value_parser = table, help_heading = "Projection engine")]
+    table: Option<[u32; 3]>,
+    /// What the table's texels are: float, unorm16 or unorm8
+    #[arg(long, value_name = "FORMAT", value_parser = named::<Texels>, help_heading = "Projection engine")]
+    texels: Option<Texels>,
+}
+
+impl Variant {
+    /// `switches`, with what was said in their place.
+    pub(crate) fn apply(&self, switches: Switches) -> Switches {
+        Switches {
+            fragments: self.fragments.unwrap_or(switches.fragments),
+            thickness: self.thickness.unwrap_or(switches.thickness),
+            order: self.order.unwrap_or(switches.order),
+            target: self.target.unwrap_or(switches.target),
+            dither: self.dither || switches.dither,
+            compositing: self.compositing.unwrap_or(switches.compositing),
+            coloring: self.coloring.unwrap_or(switches.coloring),
+            table: self.table.unwrap_or(switches.table),
+            texels: self.texels.unwrap_or(switches.texels),
+        }
+    }
+}
+
+/// The switches of a scene's "projection".
+pub(crate) fn of_scene(scene: &Scene, path: &Path) -> Result<Switches> {
+    let Some(value) = &scene.projection else { return Ok(Switches::default()) };
+    serde_path_to_error::deserialize(value).with_context(|| format!("{}: projection", path.display()))
+}
+
+/// A variant by the name that scenes know it by.
+fn named<T: DeserializeOwned>(text: &str) -> Result<T, String> {
+    let text: serde::de::value::StrDeserializer<serde::de::value::Error> = text.into_deserializer();
+    T::deserialize(text).map_err(|e| e.to_string())
+}
+
+/// `NxNxN`
+fn table(text: &str) -> Result<[u32; 3], String> {
+    let parts: Result<Vec<u32>, _> = text.split('x').map(str::parse).collect();
+    parts.ok().and_then(|p| p.try_into().ok()).ok_or_else(|| "the size is three numbers, such as 256x256x16".into())
+}

@@ -1,0 +1,46 @@
+//! The transfer function as `shaders/integral.wgsl` reads it.
+
+use super::Gpu;
+use super::buffers::Buffer;
+use crate::error::Result;
+use crate::integral::{Exact, Knots};
+use bytemuck::{Pod, Zeroable};
+use wgpu::BufferUsages as Usage;
+
+/// `Function` in the shader.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Function {
+    opacity: u32,
+    color: u32,
+    end: u32,
+    scale: f32,
+}
+
+/// `Knot` in the shader.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Knot {
+    value: [f32; 4],
+    slope: [f32; 4],
+    s: f32,
+    padding: [f32; 3],
+}
+
+/// `Function`, its knots and its buckets: bindings 0 to 2 of group 0.
+pub(crate) fn upload(gpu: &Gpu, exact: &Exact<f32>) -> Result<[Buffer; 3]> {
+    let functions: Vec<&Knots<f32>> = [Some(&exact.opacity), exact.color.as_ref()].into_iter().flatten().collect();
+    let (mut knots, mut buckets) = (Vec::<Knot>::new(), Vec::<u32>::new());
+    for f in functions {
+        buckets.extend(f.bucket.iter().map(|b| b + knots.len() as u32));
+        let knot = |i: usize| Knot { value: f.value[i], slope: f.slope[i], s: f.s[i], padding: [0.0; 3] };
+        knots.extend((0..f.len()).map(knot));
+    }
+    let end = knots.len() as u32;
+    let function = Function { opacity: 0, color: exact.opacity.len() as u32, end, scale: exact.scale };
+    Ok([
+        Buffer::holding(gpu, "function", &[function], Usage::UNIFORM)?,
+        Buffer::holding(gpu, "knots", &knots, Usage::STORAGE)?,
+        Buffer::holding(gpu, "buckets", &buckets, Usage::STORAGE)?,
+    ])
+}

@@ -1,0 +1,118 @@
+//! Order by depth: a stable radix sort, parallel, of one key for each cell.
+//!
+//! A key is a number without sign that falls as the cell's depth rises, so that ascending keys are back to front. Cells of equal keys
+//! stay as they are stored, so that every run draws the same.
+
+use super::{Provenance, VisibilityOrder};
+use rayon::prelude::*;
+
+/// The key of a cell that is not drawn.
+pub const HIDDEN: u32 = u32::MAX;
+
+/// Set in the keys of cells that are drawn in [`PARTS`] parts.
+pub const IN_PARTS: u32 = 1;
+
+/// Parts that such a cell is drawn in.
+pub const PARTS: usize = 3;
+
+/// Bits of a key that one pass sorts by.
+const BITS: u32 = 11;
+const DIGITS: usize = 1 << BITS;
+
+/// Cells that one task handles at least.
+const LEAST: usize = 1 << 14;
+
+/// A key and its cell.
+type Item = (u32, u32);
+
+/// The order that `keys` say, one for each cell; without `sort`, that in which the cells are stored.
+pub fn order(keys: &[u32], sort: bool) -> VisibilityOrder {
+    let parts = |key: u32| if key == HIDDEN { 0 } else { [1, PARTS][(key & IN_PARTS) as usize] };
+    let items: Vec<Item> = keys
+        .par_iter()
+        .with_min_len(LEAST)
+        .enumerate()
+        .flat_map_iter(|(cell, &key)| std::iter::repeat_n((key, cell as u32), parts(key)))
+        .collect();
+    let (items, provenance) = if sort { (sorted(items), Provenance::Depth) } else { (items, Provenance::None) };
+    VisibilityOrder { cells: items.into_par_iter().map(|(_, cell)| cell).collect(), provenance }
+}
+
+/// `items` in ascending order of their keys; equal ones stay in sequence.
+fn sorted(mut items: Vec<Item>) -> Vec<Item> {
+    let mut other = vec![(0, 0); items.len()];
+    for shift in (0..u32::BITS).step_by(BITS as usize) {
+        if pass(&items, &mut other, shift) {
+            std::mem::swap(&mut items, &mut other);
+        }
+    }
+    items
+}
+
+/// Sorts by one digit; false, and nothing is done, if all have the same.
+fn pass(from: &[Item], to: &mut [Item], shift: u32) -> bool {
+    let digit = |item: &Item| (item.0 >> shift) as usize % DIGITS;
+    let block = from.len().div_ceil(4 * rayon::current_num_threads()).max(LEAST);
+    let counts: Vec<Vec<u32>> = from
+        .par_chunks(block)
+        .map(|part| {
+            let mut counts = vec![0; DIGITS];
+            part.iter().for_each(|item| counts[digit(item)] += 1);
+            counts
+        })
+        .collect();
+    if from.first().is_none_or(|f| counts.iter().map(|c| c[digit(f)] as usize).sum::<usize>() == from.len()) {
+        return false;
+    }
+    // Where each block puts its items of each digit: digits first, then blocks, so that equal ones stay in sequence.
+    let mut places: Vec<Vec<&mut [Item]>> = counts.iter().map(|_| Vec::with_capacity(DIGITS)).collect();
+    let mut rest = to;
+    for d in 0..DIGITS {
+        for (places, counts) in places.iter_mut().zip(&counts) {
+            let (own, others) = rest.split_at_mut(counts[d] as usize);
+            places.push(own);
+            rest = others;
+        }
+    }
+    from.par_chunks(block).zip(places).for_each(|(part, mut places)| {
+        for item in part {
+            let place = &mut places[digit(item)];
+            if let Some((next, others)) = std::mem::take(place).split_first_mut() {
+                *next = *item;
+                *place = others;
+            }
+        }
+    });
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// The same by the standard library's stable sort.
+    fn expected(keys: &[u32]) -> Vec<u32> {
+        let mut items: Vec<Item> = keys.iter().copied().zip(0..).filter(|i| i.0 != HIDDEN).collect();
+        items.sort_by_key(|i| i.0);
+        items.iter().flat_map(|&(key, cell)| vec![cell; if key & IN_PARTS == 1 { PARTS } else { 1 }]).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn orders_as_a_stable_sort_does(keys in prop::collection::vec(prop_oneof![any::<u32>(), 0..9u32, Just(HIDDEN)], 0..3000)) {
+            let order = order(&keys, true);
+            prop_assert_eq!(order.provenance, Provenance::Depth);
+            prop_assert_eq!(order.cells, expected(&keys));
+        }
+    }
+
+    #[test]
+    fn many_blocks_are_one_order() {
+        // Few keys, many of each: a block out of sequence would show.
+        let keys: Vec<u32> = (0..300_000u32).map(|i| i.wrapping_mul(0x9e37_79b9) >> 25 << 20).collect();
+        assert_eq!(order(&keys, true).cells, expected(&keys));
+        let seen: Vec<u32> = (0..300_000).filter(|&i| keys[i as usize] & 1 == 0).collect();
+        assert_eq!(order(&keys, false).cells, seen);
+    }
+}

@@ -1,0 +1,168 @@
+//! The projection engine: cells are sorted by depth, projected to triangles, and blended from back to front.
+//!
+//! Shirley & Tuchman's projected tetrahedra (1990) as Kraus, Qiao & Ebert made them right (Projecting Tetrahedra without
+//! Rendering Artifacts, 2004). It needs no neighbours, so it also draws meshes whose topology moves; and it is a test bed,
+//! in which each published variant can be switched on: [`Switches`] are what differs.
+
+mod frame;
+pub(crate) mod gpu;
+
+use crate::integral::table;
+use serde::{Deserialize, Serialize};
+
+/// Which variant of the engine draws. The default is the most accurate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
+pub struct Switches {
+    /// Where the values and lengths of a fragment come from.
+    pub fragments: Fragments,
+    /// How long a ray's way through a cell is; not for [`Fragments::Intersected`].
+    pub thickness: Thickness,
+    /// In which sequence cells are drawn.
+    pub order: Order,
+    /// What cells are blended into.
+    pub target: Target,
+    /// Alpha dithering (Kraus et al. 2004, section 4.2): before they are blended into 8 bits, opacities are rounded up with a
+    /// probability of the fraction that is lost else. Nothing for other targets.
+    pub dither: bool,
+    /// How a cell joins what lies behind it.
+    pub compositing: Compositing,
+    /// Where a fragment's colour and opacity come from.
+    pub coloring: Coloring,
+    /// Values in front, values behind and lengths of a table.
+    pub table: [u32; 3],
+    /// What a table's texels are.
+    pub texels: Texels,
+}
+
+impl Default for Switches {
+    fn default() -> Self {
+        Switches {
+            fragments: Fragments::default(),
+            thickness: Thickness::default(),
+            order: Order::default(),
+            target: Target::default(),
+            dither: false,
+            compositing: Compositing::default(),
+            coloring: Coloring::default(),
+            table: [256, 256, 16],
+            texels: Texels::default(),
+        }
+    }
+}
+
+/// Where the values and lengths of a fragment come from.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Fragments {
+    /// The pixel's ray is intersected with the cell.
+    #[default]
+    Intersected,
+    /// Interpolated between the projected corners, with the correction for perspective (Kraus et al. 2004, section 2).
+    Interpolated,
+    /// Interpolated linearly on the screen, as in the earlier systems (Röttger, Kraus & Ertl 2000): wrong in perspective views.
+    Linear,
+}
+
+/// How long a ray's way through a cell is.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Thickness {
+    /// The distance of front and back.
+    #[default]
+    Distance,
+    /// The difference of their depths: too little beside the middle of a perspective view.
+    Depth,
+}
+
+/// In which sequence cells are drawn.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Order {
+    /// From back to front by the distance of their centres.
+    #[default]
+    Depth,
+    /// From back to front by the power of the eye with respect to their circumspheres: right for all cells that are of
+    /// a Delaunay mesh, and far off for slivers of others.
+    Circumsphere,
+    /// As they are stored.
+    None,
+}
+
+/// What cells are blended into.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Target {
+    /// 32-bit floats. Not every device blends into these.
+    #[default]
+    Rgba32float,
+    /// 16-bit floats.
+    Rgba16float,
+    /// 8 bits.
+    Rgba8,
+}
+
+/// How a cell joins what lies behind it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Compositing {
+    /// It hides a share of that: its opacity.
+    #[default]
+    Over,
+    /// It hides nothing.
+    Additive,
+}
+
+/// Where a fragment's colour and opacity come from.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Coloring {
+    /// The exact integral.
+    #[default]
+    Exact,
+    /// A table of premultiplied colour and opacity for lengths that are equally far apart.
+    Uniform,
+    /// The same for logarithmic lengths: some 4 % too much of both in thin cells. See [`crate::integral::table`].
+    Log,
+    /// A table of colour and mean extinction for logarithmic lengths, without that fault.
+    LogNormalised,
+}
+
+impl Coloring {
+    /// The kind of table, if it is one.
+    pub fn table(self) -> Option<table::Kind> {
+        match self {
+            Coloring::Exact => None,
+            Coloring::Uniform => Some(table::Kind::Uniform),
+            Coloring::Log => Some(table::Kind::Log),
+            Coloring::LogNormalised => Some(table::Kind::LogNormalised),
+        }
+    }
+}
+
+/// What a table's texels are.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Texels {
+    /// 32-bit floats.
+    #[default]
+    Float,
+    /// 16 bits, of the range from 0 to the largest there is.
+    Unorm16,
+    /// 8 bits, likewise.
+    Unorm8,
+}
+
+/// What a frame took.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Counts {
+    /// Cells and parts of cells that were drawn.
+    pub(crate) records: u64,
+    /// From the start of the frame until the order was known; 0 where it was known before.
+    pub(crate) order_ms: f64,
+    /// By the device's own clock, where it has one: projecting all cells of the order, and drawing them.
+    pub(crate) project_ms: Option<f64>,
+    pub(crate) draw_ms: Option<f64>,
+    /// Fragments that were computed, where the device counts them.
+    pub(crate) fragments: Option<u64>,
+}

@@ -1,0 +1,121 @@
+//! What a frame's shaders need to know of a view and a transfer function.
+
+use crate::field::Kind;
+use crate::integral::{Exact, Knots};
+use crate::traverse::Geometry;
+use crate::view::{Fan, Projection, View};
+use bytemuck::{Pod, Zeroable};
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// Stands for ±∞ in limits of t, which are within ±10 else.
+pub(super) const FAR: f32 = 1e30;
+
+/// Up to this distance from the mesh's centre, in normalised units, rays start at the eye.
+const NEAR_EYE: f64 = 2.0;
+
+/// Cells that reach nearer to the plane through the eye than this, in normalised units, are special.
+const NEAREST: f64 = 1e-4;
+
+/// Equal parts of the values' range, for each of which it is known whether the function is empty there.
+pub(super) const FILLED: usize = 1024;
+
+/// `Frame` in the shaders.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Frame {
+    base: [f32; 4],
+    base_low: [f32; 4],
+    across: [[f32; 4]; 2],
+    forward: [f32; 4],
+    origin: [[f32; 4]; 2],
+    direction: [[f32; 4]; 3],
+    size: [f32; 2],
+    offset: [f32; 2],
+    near: f32,
+    far: f32,
+    nearest: f32,
+    perspective: u32,
+    planes: u32,
+    has_ends: u32,
+    unused: [u32; 2],
+}
+
+/// A view as the shaders see it.
+pub(super) struct Seen {
+    pub(super) frame: Frame,
+    pub(super) planes: Vec<[f32; 4]>,
+    /// Where a depth buffer ends each pixel's ray; empty without one.
+    pub(super) ends: Vec<f32>,
+}
+
+impl Seen {
+    pub(super) fn new(geometry: &Geometry, view: &View) -> Self {
+        let fan = view.fan(geometry.centre, geometry.scale, NEAR_EYE);
+        let [base, forward] = [fan.origin[0], fan.direction[0]];
+        let four = |v: DVec3, w: f64| v.extend(w).as_vec4().to_array();
+        let high = base.as_vec3().as_dvec3();
+        let perspective = matches!(view.camera().projection, Projection::Perspective { .. });
+        // What the image spans at depth 1 (perspective) or at any (parallel).
+        let spans = if perspective { [fan.direction[1], fan.direction[2]] } else { [fan.origin[1], fan.origin[2]] };
+        let planes: Vec<[f32; 4]> = view
+            .clipping_planes()
+            .iter()
+            .map(|p| {
+                let normal = (p.normal / p.normal.abs().max_element()).normalize();
+                four(normal, normal.dot((geometry.centre - p.origin) * geometry.scale + base))
+            })
+            .collect();
+        let ends = ends(view, &fan, geometry.scale);
+        let limit = |t: f64| (t as f32).clamp(-FAR, FAR);
+        let frame = Frame {
+            base: four(high, 0.0),
+            base_low: four(base - high, 0.0),
+            across: spans.map(|v| four(v / v.length_squared(), 0.0)),
+            forward: four(forward, if perspective { fan.ahead } else { 0.0 }),
+            origin: [fan.origin[1], fan.origin[2]].map(|v| four(v, 0.0)),
+            direction: fan.direction.map(|v| four(v, 0.0)),
+            size: view.size().map(|n| n as f32),
+            offset: fan.offset.as_vec2().to_array(),
+            near: limit(fan.near),
+            far: limit(fan.far),
+            nearest: (fan.near + fan.ahead).max(NEAREST) as f32,
+            perspective: u32::from(perspective),
+            planes: planes.len() as u32,
+            has_ends: u32::from(!ends.is_empty()),
+            unused: [0; 2],
+        };
+        Seen { frame, planes, ends }
+    }
+}
+
+/// Where a depth buffer ends each pixel's ray, as the shader counts t; empty without one.
+fn ends(view: &View, fan: &Fan, scale: f64) -> Vec<f32> {
+    if !view.has_depth() {
+        return vec![];
+    }
+    let [w, h] = view.size();
+    let pixels = 0..w as usize * h as usize;
+    let end = |p: usize| {
+        let ray = view.ray((p % w as usize) as u32, (p / w as usize) as u32);
+        let start = fan.ahead / ray.direction.dot(fan.direction[0]);
+        ((ray.t_max * scale - start) as f32).clamp(-FAR, FAR)
+    };
+    pixels.into_par_iter().map(end).collect()
+}
+
+/// For each of [`FILLED`] + 1 places that part the range of the last component, [−1, 1], equally: the number of parts below it
+/// in which something may be seen.
+pub(super) fn filled(exact: &Exact<f32>) -> Vec<u32> {
+    // Where emission is not bound to extinction, another component may shine.
+    let shines = exact.direct && exact.kind != Kind::Scalar;
+    let counts = |knots: &Knots<f32>, k: f64| {
+        let at = |b: f64| (2.0 * b / FILLED as f64 - 1.0) as f32;
+        shines || knots.shows(at(k), at(k + 1.0), exact.direct)
+    };
+    let mut sum = vec![0; FILLED + 1];
+    for k in 0..FILLED {
+        sum[k + 1] = sum[k] + u32::from(counts(&exact.opacity, k as f64));
+    }
+    sum
+}

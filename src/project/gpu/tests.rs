@@ -1,0 +1,155 @@
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr, reason = "tests")]
+
+use super::*;
+use crate::field::{Association, Component, Field, Kind};
+use crate::mesh::{cells::Tetrahedra, generate};
+use crate::render::{Engine, Renderer};
+use crate::transfer::TransferFunction;
+use crate::view::{Camera, Projection};
+use glam::{DVec3, dvec3};
+use wgpu::naga;
+
+/// The device to test: `HALITE_TEST_DEVICE`, or the first. Without any, tests are skipped, loudly; with
+/// `HALITE_REQUIRE_GPU=1` they fail.
+fn gpu() -> Option<Gpu> {
+    let name = std::env::var("HALITE_TEST_DEVICE").unwrap_or_else(|_| "0".into());
+    match Gpu::open(&DeviceChoice::Named(name)) {
+        Ok(gpu) => gpu,
+        Err(e) if std::env::var("HALITE_REQUIRE_GPU").is_ok_and(|v| v == "1") => panic!("{e}"),
+        Err(e) => {
+            eprintln!("SKIPPED, as there is no GPU to test: {e}");
+            None
+        }
+    }
+}
+
+fn arrays(chunks: usize) -> Vec<Array> {
+    let names = [("cells", "vec4u"), ("points", "Point"), ("values", "Value")];
+    names.map(|(name, element)| Array { name, element, chunks, shift: 22 }).to_vec()
+}
+
+fn validated(source: &str) -> naga::Module {
+    let module = match naga::front::wgsl::parse_str(source) {
+        Ok(module) => module,
+        Err(e) => panic!("{}", e.emit_to_string(source)),
+    };
+    let flags = naga::valid::ValidationFlags::all();
+    match naga::valid::Validator::new(flags, naga::valid::Capabilities::empty()).validate(&module) {
+        Ok(_) => module,
+        Err(e) => panic!("{}", e.emit_to_string(source)),
+    }
+}
+
+const KINDS: [Kind; 3] = [Kind::Scalar, Kind::Pair, Kind::Rgba];
+const FORMS: [Fragments; 3] = [Fragments::Intersected, Fragments::Interpolated, Fragments::Linear];
+
+#[test]
+fn every_program_is_valid() {
+    for kind in KINDS {
+        for fragments in FORMS {
+            for (direct, chunks, association) in [(false, 1, "POINT"), (true, 3, "CORNER"), (false, 2, "CELL")] {
+                let kind_of = |coloring| match kind {
+                    Kind::Scalar => coloring,
+                    _ => Coloring::Exact,
+                };
+                for (coloring, compositing) in [
+                    (Coloring::Exact, Compositing::Over),
+                    (Coloring::Uniform, Compositing::Additive),
+                    (Coloring::LogNormalised, Compositing::Over),
+                ] {
+                    let switches = Switches {
+                        fragments,
+                        coloring: kind_of(coloring),
+                        compositing,
+                        dither: true,
+                        target: Target::Rgba8,
+                        ..Switches::default()
+                    };
+                    validated(&program(&Variant { kind, direct }, association, &switches, &arrays(chunks)));
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn layouts_match_their_rust_twins() {
+    for (kind, components) in KINDS.into_iter().zip([1, 2, 4]) {
+        for fragments in FORMS {
+            let switches = Switches { fragments, ..Switches::default() };
+            let module = validated(&program(&Variant { kind, direct: false }, "POINT", &switches, &arrays(1)));
+            let span = |name: &str| {
+                let (_, t) = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name)).unwrap();
+                let naga::TypeInner::Struct { span, .. } = &t.inner else { panic!("{name} is no struct") };
+                u64::from(*span)
+            };
+            let record = match components {
+                1 => stride::<1>(fragments),
+                2 => stride::<2>(fragments),
+                _ => stride::<4>(fragments),
+            };
+            let rust = [
+                ("Record", record),
+                ("Frame", size_of::<Frame>() as u64),
+                ("Part", size_of::<Slice>() as u64),
+                ("Point", size_of::<Point>() as u64),
+                ("Table", 32),
+            ];
+            for (name, size) in rust {
+                assert_eq!(span(name), size, "{name}, {kind:?}, {fragments:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_device_sorts_as_the_host_does() {
+    let Some(gpu) = gpu() else { return };
+    let sorter = Sorter::new(&gpu, HIDDEN).unwrap();
+    let mut seed = 5u64;
+    for (n, mask) in [(1, !0), (255, !0), (2048, 15), (5000, !0), (70_001, 0xff), (70_000, !0)] {
+        let keys: Vec<u32> = (0..n)
+            .map(|_| {
+                seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                let hidden = (seed >> 20).is_multiple_of(5);
+                if hidden { HIDDEN } else { (seed >> 32) as u32 & mask & !IN_PARTS }
+            })
+            .collect();
+        let expected = depth::order(&keys, true).cells;
+        let usage = Usage::STORAGE | Usage::COPY_SRC;
+        let buffer = Buffer::holding(&gpu, "keys", &keys, usage).unwrap();
+        let (numbers, count) = sorter.sort(&gpu, &buffer, keys.len(), 2).unwrap();
+        let back = Readback::new(&gpu, 4 * count as u64).unwrap();
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        encoder.copy_buffer_to_buffer(&numbers.raw, 8, back.raw(), 0, 4 * count as u64);
+        let sorted: Vec<u32> =
+            back.submit(&gpu, encoder, |bytes| bytemuck::cast_slice(&bytes[..4 * count]).to_vec()).unwrap();
+        assert_eq!(sorted.len(), expected.len(), "{n} keys");
+        assert!(sorted == expected, "{n} keys are in another order");
+    }
+}
+
+#[test]
+fn pictures_do_not_depend_on_who_sorts() {
+    let Some(gpu) = gpu() else { return };
+    let choice = DeviceChoice::Named(gpu.adapter.index.to_string());
+    let mut renderer = Renderer::with_engine(2, choice, Engine::Project).unwrap();
+    let mesh = generate::tetrahedra(8);
+    renderer.set_mesh(&mesh, Tetrahedra::new(&mesh).unwrap());
+    let field = Field::new(&mesh, "s", Some(Association::Point), Component::Index(0)).unwrap();
+    renderer.set_field(&field).unwrap();
+    let [low, high] = field.range(0);
+    let color = vec![(low, [1.0, 0.0, 0.0]), (high, [0.0, 1.0, 0.0])];
+    renderer.set_transfer(&TransferFunction::new(color, vec![(0.0, 0.0), (high, 4.0)], 1.0).unwrap());
+    let projection = Projection::Perspective { view_angle: 50.0 };
+    let camera = Camera { position: dvec3(1.0, 2.0, 3.0), focal_point: DVec3::ZERO, view_up: DVec3::Y, projection };
+    let view = View::new(camera, [48, 40]).unwrap();
+    let [host, device] = [false, true].map(|on_device| {
+        renderer.project().unwrap().sort_on_device(on_device);
+        renderer.render(&view, &|_| ()).unwrap()
+    });
+    assert!(host.pixels.iter().any(|p| p[3] > 0.5));
+    assert!(host == device);
+    let drawn = renderer.stats().projection.unwrap().drawn_cells;
+    assert!(drawn > 0 && drawn < mesh.cells().len() as u64, "{drawn} cells drawn, some are empty");
+}

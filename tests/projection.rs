@@ -1,0 +1,319 @@
+//! The projection engine against the judge, and each of its published faults against its cure.
+//!
+//! Order by depth is right for some meshes only, so pictures of one colour are judged: of these the order changes nothing.
+
+#![allow(
+    clippy::expect_used,
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stderr,
+    reason = "a test fails by panicking, and tells what it measured"
+)]
+
+mod common;
+
+use common::draw::{self, FIELDS, LOOKS, MESHES, Random, VIEWS};
+use common::{Engine, Report, Scene, rounds};
+use glam::{DVec3, dvec3};
+use halite::field::Association;
+use halite::gpu::DeviceChoice;
+use halite::image::Image;
+use halite::mesh::{Array, Mesh, Values, generate};
+use halite::project::{Coloring, Compositing, Fragments, Order, Switches, Target, Texels, Thickness};
+use halite::render::{self, Renderer};
+use halite::transfer::{Emission, TransferFunction};
+use halite::view::{Blend, Camera, Projection, View};
+
+/// A renderer on `HALITE_TEST_DEVICE`, or the first device. Without any, tests are skipped, loudly; with
+/// `HALITE_REQUIRE_GPU=1` they fail.
+fn renderer() -> Option<Renderer> {
+    let name = std::env::var("HALITE_TEST_DEVICE").unwrap_or_else(|_| "0".into());
+    match Renderer::with_engine(2, DeviceChoice::Named(name), render::Engine::Project) {
+        Ok(renderer) => Some(renderer),
+        Err(e) if std::env::var("HALITE_REQUIRE_GPU").is_ok_and(|v| v == "1") => panic!("{e}"),
+        Err(e) => {
+            eprintln!("SKIPPED, as there is no device to test: {e}");
+            None
+        }
+    }
+}
+
+fn set(renderer: &mut Renderer, scene: &Scene) {
+    renderer.set_mesh(&scene.mesh, scene.tetrahedra.clone());
+    renderer.set_field(&scene.field).unwrap();
+    renderer.set_transfer(&scene.transfer);
+}
+
+fn image(renderer: &mut Renderer, switches: Switches, view: &View) -> Image {
+    renderer.set_switches(switches);
+    renderer.render(view, &|_| ()).unwrap()
+}
+
+fn rmse(a: &Image, b: &Image) -> f64 {
+    a.compare(b).unwrap().rmse
+}
+
+const INTERPOLATED: Fragments = Fragments::Interpolated;
+
+#[test]
+fn one_colour_needs_no_order() {
+    let Some(mut renderer) = renderer() else { return };
+    let mut report = Report::default();
+    let looks: Vec<_> = LOOKS.iter().filter(|l| l.emission == Emission::Chromatic).collect();
+    let lots: Vec<_> = FIELDS.iter().filter(|f| f.components < 4).collect();
+    for round in 0..rounds(1) {
+        for (m, (name, mesh)) in MESHES.iter().enumerate() {
+            for v in [0, 1] {
+                let (look, lot) = (looks[(m + 3 * v + round) % looks.len()], lots[(2 * m + v + round) % lots.len()]);
+                let (view_name, view) = VIEWS[(5 * m + 8 * v + 3 * round) % VIEWS.len()];
+                let case = format!("{name}, {}, {}, {view_name}, {round}", look.name, lot.name);
+                let mut random = Random::of(&case);
+                let mut scene = draw::scene(&mesh(), lot, look, &mut random);
+                let t = &scene.transfer;
+                scene.transfer =
+                    TransferFunction::new(vec![(0.0, [0.3, 0.6, 0.9])], t.opacity().to_vec(), t.unit_distance())
+                        .unwrap()
+                        .with_convention(t.convention())
+                        .with_clamp(true);
+                let view = view(&mut random).with_blend(Blend::Composite);
+                let expected = Engine::Reference.image(&scene, &view);
+                set(&mut renderer, &scene);
+                let got = image(&mut renderer, Switches::default(), &view);
+                report.hold(&case, &got, &expected, 2e-4);
+            }
+        }
+    }
+    report.finish("one colour");
+}
+
+/// A peak of opacity in a field, seen at 60 degrees from near.
+fn peak() -> (Scene, View) {
+    let mesh = generate::tetrahedra(9);
+    let scene = Scene::new(&mesh, mesh.point_arrays()[0].clone(), Association::Point, |field| {
+        let [lo, hi] = field.range(0);
+        let at = |x: f64| lo + (hi - lo) * x;
+        let opacity = vec![(at(0.0), 0.0), (at(0.57), 0.0), (at(0.6), 12.0), (at(0.63), 0.0), (at(1.0), 0.0)];
+        TransferFunction::new(vec![(0.0, [0.9, 0.7, 0.4])], opacity, 0.2).unwrap()
+    });
+    (scene, perspective(dvec3(0.7, 1.3, 1.9), 75.0))
+}
+
+fn perspective(position: DVec3, view_angle: f64) -> View {
+    let projection = Projection::Perspective { view_angle };
+    View::new(Camera { position, focal_point: DVec3::ZERO, view_up: DVec3::Y, projection }, [72, 64]).unwrap()
+}
+
+/// A lattice of small cells in the middle of a big tetrahedron's neighbourhood: its edges are 400 times longer.
+fn huge_neighbour() -> (Scene, View) {
+    let small = generate::tetrahedra(7);
+    let (mut points, cells) = (small.points().to_vec(), small.cells());
+    let first = points.len() as u32;
+    // Behind the lattice, and beside the view.
+    points.extend([
+        dvec3(-60.0, -60.0, -9.0),
+        dvec3(60.0, -60.0, -9.0),
+        dvec3(0.0, 60.0, -9.0),
+        dvec3(0.0, 0.0, -90.0),
+    ]);
+    let own = [first, first + 1, first + 2, first + 3];
+    let all = (0..cells.len()).map(|c| (cells.types[c], cells.points(c))).chain([(10, &own[..])]);
+    let mesh = draw::mesh_of(points, all);
+    let values = mesh.points().iter().map(|p| if p.z > -2.0 { 1.0 + 0.3 * p.x } else { 0.0 }).collect();
+    let array = Array { name: "s".into(), components: 1, values: Values::F64(values) };
+    let scene = Scene::new(&mesh, array, Association::Point, |_| {
+        let opacity = vec![(0.0, 0.0), (0.5, 0.0), (0.7, 0.5), (1.3, 0.8)];
+        TransferFunction::new(vec![(0.0, [0.2, 0.5, 0.9]), (1.3, [0.9, 0.5, 0.2])], opacity, 1.0).unwrap()
+    });
+    (scene, perspective(dvec3(0.3, 0.5, 6.0), 25.0))
+}
+
+/// Many cells of little opacity each.
+fn thin() -> (Scene, View) {
+    let mesh = generate::tetrahedra(15);
+    let scene = Scene::new(&mesh, mesh.point_arrays()[0].clone(), Association::Point, |field| {
+        let [lo, hi] = field.range(0);
+        TransferFunction::new(vec![(0.0, [0.8, 0.5, 0.3])], vec![(lo, 0.1), (hi, 0.3)], 1.0).unwrap()
+    });
+    (scene, perspective(dvec3(1.0, 2.0, 5.0), 25.0))
+}
+
+/// Two parts with a gap, a tunnel, a cavity and bays, in colours that tell which hides which.
+fn holes() -> (Scene, View) {
+    let mesh = generate::islands(10);
+    let scene = Scene::new(&mesh, mesh.point_arrays()[0].clone(), Association::Point, |field| {
+        let [lo, hi] = field.range(0);
+        let color = vec![(lo, [1.0, 0.1, 0.0]), ((lo + hi) / 2.0, [0.1, 0.9, 0.1]), (hi, [0.0, 0.1, 1.0])];
+        TransferFunction::new(color, vec![(lo, 2.0), (hi, 4.0)], 1.0).unwrap()
+    });
+    (scene, perspective(dvec3(2.5, 1.5, 4.0), 35.0))
+}
+
+/// The error of `fault` and of `cure` in a scene, against the judge.
+fn errors<const N: usize>((scene, view): &(Scene, View), variants: [Switches; N]) -> Option<[f64; N]> {
+    let mut renderer = renderer()?;
+    set(&mut renderer, scene);
+    let expected = Engine::Reference.image(scene, view);
+    Some(variants.map(|s| rmse(&image(&mut renderer, s, view), &expected)))
+}
+
+#[test]
+fn perspective_interpolation_cures_linear() {
+    let form = |fragments| Switches { fragments, ..Switches::default() };
+    let by_depth = Switches { thickness: Thickness::Depth, ..form(INTERPOLATED) };
+    let variants = [form(Fragments::Linear), by_depth, form(INTERPOLATED), form(Fragments::Intersected)];
+    let Some([linear, by_depth, interpolated, intersected]) = errors(&peak(), variants) else { return };
+    eprintln!(
+        "linear {linear:.1e}, by depth {by_depth:.1e}, interpolated {interpolated:.1e}, intersected {intersected:.1e}"
+    );
+    assert!(linear > 20.0 * interpolated && by_depth > 5.0 * interpolated);
+    assert!(interpolated < 5e-4 && intersected < 1e-5);
+}
+
+#[test]
+fn more_bits_cure_the_table() {
+    let texels = |texels| Switches { coloring: Coloring::LogNormalised, texels, ..Switches::default() };
+    let published = |texels| Switches { coloring: Coloring::Log, texels, ..Switches::default() };
+    let variants = [Texels::Unorm8, Texels::Unorm16, Texels::Float].map(texels);
+    let Some([eight, sixteen, float]) = errors(&thin(), variants) else { return };
+    let Some([published_eight, published_sixteen]) = errors(&thin(), [Texels::Unorm8, Texels::Unorm16].map(published))
+    else {
+        return;
+    };
+    eprintln!(
+        "8 bits {eight:.1e}, 16 {sixteen:.1e}, float {float:.1e}; as published {published_eight:.1e}, {published_sixteen:.1e}"
+    );
+    assert!(eight > 10.0 * sixteen && float < 2.0 * sixteen && sixteen < 2e-4);
+    assert!(published_eight > 1.5 * published_sixteen);
+}
+
+#[test]
+fn logarithmic_lengths_cure_uniform_ones() {
+    let coloring = |coloring| Switches { coloring, table: [64, 64, 16], ..Switches::default() };
+    let variants = [Coloring::Uniform, Coloring::Log, Coloring::LogNormalised].map(coloring);
+    let Some([uniform, log, normalised]) = errors(&huge_neighbour(), variants) else { return };
+    eprintln!("uniform {uniform:.1e}, log {log:.1e}, normalised {normalised:.1e}");
+    assert!(uniform > 2.0 * log && log > 5.0 * normalised && normalised < 1e-3);
+}
+
+#[test]
+fn floats_and_dithering_cure_8_bits() {
+    let Some(mut renderer) = renderer() else { return };
+    let (scene, view) = thin();
+    set(&mut renderer, &scene);
+    let expected = Engine::Reference.image(&scene, &view);
+    let eight = Switches { target: Target::Rgba8, ..Switches::default() };
+    let variants = [
+        eight,
+        Switches { dither: true, ..eight },
+        Switches { target: Target::Rgba16float, ..eight },
+        Switches::default(),
+    ];
+    let [plain, dithered, half, float] =
+        variants.map(|s| rmse(&blurred(&image(&mut renderer, s, &view)), &blurred(&expected)));
+    eprintln!("8 bits {plain:.1e}, dithered {dithered:.1e}, 16-bit floats {half:.1e}, floats {float:.1e}");
+    assert!(plain > 3.0 * dithered && dithered > half && half > 5.0 * float && float < 1e-5);
+
+    // Cells that only add up dither their colours.
+    let additive = |s| Switches { compositing: Compositing::Additive, ..s };
+    let [sum, plain, dithered] = [Switches::default(), eight, Switches { dither: true, ..eight }]
+        .map(|s| blurred(&colours(image(&mut renderer, additive(s), &view))));
+    let [plain, dithered] = [plain, dithered].map(|i| rmse(&i, &sum));
+    eprintln!("additive: 8 bits {plain:.1e}, dithered {dithered:.1e}");
+    assert!(plain > 3.0 * dithered);
+}
+
+/// Without opacities, which no dithering helps where cells add up; within what 8 bits can hold.
+fn colours(mut image: Image) -> Image {
+    image.pixels.iter_mut().for_each(|p| *p = [p[0].min(1.0), p[1].min(1.0), p[2].min(1.0), 0.0]);
+    image
+}
+
+/// Means of 8 × 8 pixels.
+fn blurred(image: &Image) -> Image {
+    let [w, h] = image.size;
+    let mut small = Image::new([w / 8, h / 8]);
+    for (i, pixel) in small.pixels.iter_mut().enumerate() {
+        let (x, y) = (i as u32 % (w / 8), i as u32 / (w / 8));
+        for (dx, dy) in (0..64).map(|k| (k % 8, k / 8)) {
+            let at = image.pixels[((8 * y + dy) * w + 8 * x + dx) as usize];
+            (0..4).for_each(|k| pixel[k] += at[k] / 64.0);
+        }
+    }
+    small
+}
+
+#[test]
+fn order_by_depth_cures_none() {
+    let order = |order| Switches { order, ..Switches::default() };
+    let Some([none, depth]) = errors(&holes(), [Order::None, Order::Depth].map(order)) else { return };
+    eprintln!("no order {none:.1e}, by depth {depth:.1e}");
+    assert!(none > 10.0 * depth);
+}
+
+#[test]
+fn a_still_camera_keeps_its_order() {
+    let Some(mut renderer) = renderer() else { return };
+    let (scene, view) = holes();
+    set(&mut renderer, &scene);
+    let order_ms = |r: &Renderer| r.stats().projection.unwrap().order_ms;
+    let first = image(&mut renderer, Switches::default(), &view);
+    assert!(order_ms(&renderer) > 0.0);
+    assert!(image(&mut renderer, Switches::default(), &view) == first);
+    assert_eq!(order_ms(&renderer), 0.0);
+    image(&mut renderer, Switches::default(), &perspective(dvec3(-2.5, 1.5, 4.0), 35.0));
+    assert!(order_ms(&renderer) > 0.0);
+    // Another function may show other cells.
+    renderer.set_transfer(&TransferFunction::new(vec![(0.0, [1.0; 3])], vec![(0.0, 0.0)], 1.0).unwrap());
+    let empty = image(&mut renderer, Switches::default(), &view);
+    assert!(empty.pixels.iter().all(|p| *p == [0.0; 4]));
+    assert_eq!(renderer.stats().projection.unwrap().drawn_cells, 0);
+}
+
+#[test]
+fn cells_that_are_not_seen_are_not_sorted() {
+    let Some(mut renderer) = renderer() else { return };
+    let (scene, _) = holes();
+    set(&mut renderer, &scene);
+    // A view of a corner, from inside.
+    let view = perspective(dvec3(0.5, 0.5, 0.5), 20.0);
+    image(&mut renderer, Switches::default(), &view);
+    let drawn = renderer.stats().projection.unwrap().drawn_cells;
+    assert!(drawn > 0 && drawn < scene.mesh.cells().len() as u64 / 3, "{drawn} of {}", scene.mesh.cells().len());
+}
+
+#[test]
+fn what_it_cannot_draw_it_says() {
+    let Some(mut renderer) = renderer() else { return };
+    let (scene, view) = holes();
+    set(&mut renderer, &scene);
+    let maximum = renderer.render(&view.clone().with_blend(Blend::Maximum), &|_| ()).unwrap_err();
+    assert!(maximum.to_string().contains("traverse"), "{maximum}");
+    renderer.set_switches(Switches { coloring: Coloring::Log, table: [1, 1, 1], ..Switches::default() });
+    let table = renderer.render(&view, &|_| ()).unwrap_err();
+    assert!(table.to_string().contains("table"), "{table}");
+    let cpu = Renderer::with_engine(1, DeviceChoice::Cpu, render::Engine::Project).unwrap_err();
+    assert!(cpu.to_string().contains("graphics device"), "{cpu}");
+    // It draws on after all of these.
+    assert!(image(&mut renderer, Switches::default(), &view).pixels.iter().any(|p| p[3] > 0.1));
+}
+
+/// A wedge of cells around the eye: some hold it, some are beside and behind it.
+#[test]
+fn cells_that_hold_the_eye_are_clipped_not_dropped() {
+    let mesh: Mesh = generate::tetrahedra(5);
+    let scene = Scene::new(&mesh, mesh.point_arrays()[0].clone(), Association::Point, |field| {
+        let [lo, hi] = field.range(0);
+        TransferFunction::new(vec![(0.0, [0.8, 0.5, 0.3])], vec![(lo, 0.2), (hi, 1.5)], 1.0).unwrap()
+    });
+    for (at, bound) in [(dvec3(0.13, 0.21, 0.33), 1e-3), (dvec3(-0.4, 0.33, 0.9), 1e-3)] {
+        let view = perspective(at, 100.0);
+        let form = |fragments| Switches { fragments, ..Switches::default() };
+        let Some([interpolated, intersected]) =
+            errors(&(scene.clone(), view), [form(INTERPOLATED), form(Fragments::Intersected)])
+        else {
+            return;
+        };
+        eprintln!("from {at}: interpolated {interpolated:.1e}, intersected {intersected:.1e}");
+        assert!(interpolated < bound && intersected < 1e-5);
+    }
+}
