@@ -6,6 +6,10 @@ struct Twice {
     low: vec3f,
 }
 
+fn single(v: vec3f) -> Twice {
+    return Twice(v, vec3f());
+}
+
 /// A ray's own coordinates: two axes across it, of unit length, and one along it, in lengths of its direction.
 struct Ray {
     origin: Twice,
@@ -93,15 +97,15 @@ fn dot_fma(a: vec3f, b: vec3f) -> f32 {
 fn area(a: vec4f, b: vec4f) -> f32 {
     let c = b.yx;
     let p = a.xy * c;
-    let a_high = a_shortened(a.xy);
-    let c_high = a_shortened(c);
+    let a_high = shortened_pair(a.xy);
+    let c_high = shortened_pair(c);
     let a_low = a.xy - a_high;
     let c_low = c - c_high;
     let rest = (((a_high * c_high - p) + a_high * c_low) + a_low * c_high) + a_low * c_low;
     return (p.x - p.y) + (rest.x - rest.y);
 }
 
-fn a_shortened(v: vec2f) -> vec2f {
+fn shortened_pair(v: vec2f) -> vec2f {
     return bitcast<vec2f>(bitcast<vec2u>(v) & vec2u(0xfffff000u));
 }
 

@@ -44,11 +44,11 @@ fn fragment(drawn: Drawn) -> @location(0) vec4f {
     let xy = sample_of(drawn.at.xy);
     let direction = direction_at(xy);
     let stretch = length(direction);
-    let ray = ray_along(origin_at(xy), direction / stretch);
-    let a = project(ray, drawn.a.xyz);
-    let b = project(ray, drawn.b.xyz);
-    let c = project(ray, drawn.c.xyz);
-    let d = project(ray, drawn.d.xyz);
+    let ray = ray_along(single(origin_at(xy)), single(direction / stretch));
+    let a = project(ray, single(drawn.a.xyz));
+    let b = project(ray, single(drawn.b.xyz));
+    let c = project(ray, single(drawn.c.xyz));
+    let d = project(ray, single(drawn.d.xyz));
     let ab = area(a, b);
     let ac = area(a, c);
     let ad = area(a, d);
@@ -79,7 +79,7 @@ fn fragment(drawn: Drawn) -> @location(0) vec4f {
     let last_areas = select(select(select(opposite_a, opposite_b, through.y), opposite_c, through.z), opposite_d, through.w);
     let first_weights = share(first_areas);
     let last_weights = share(last_areas);
-    let depths = vec4f(a.z, b.z, c.z, d.z);
+    let depths = vec4f(a.z + a.w, b.z + b.w, c.z + c.w, d.z + d.w);
     let first_t = dot(first_weights, depths);
     let last_t = dot(last_weights, depths);
     // The corner that the first face lacks is this far from it along the ray; the last one is at its share of that.
@@ -91,5 +91,5 @@ fn fragment(drawn: Drawn) -> @location(0) vec4f {
     let last = drawn.value_a * last_weights.x + drawn.value_b * last_weights.y + drawn.value_c * last_weights.z + drawn.value_d * last_weights.w;
     let in_sequence = first_t <= last_t;
     return shaded(drawn.at.xy, drawn.rank, select(last, first, in_sequence), select(first, last, in_sequence),
-        min(first_t, last_t), length, limits_of(drawn.at.xy, ray.origin, ray.along, stretch));
+        min(first_t, last_t), length, limits_of(drawn.at.xy, ray.origin.high, ray.along, stretch));
 }
