@@ -149,8 +149,9 @@ impl Renderer {
     pub fn set_mesh(&mut self, mesh: &Mesh, tetrahedra: Tetrahedra) {
         let start = Instant::now();
         let geometry = self.pool.install(|| {
-            let faces = Faces::new(mesh.points(), &tetrahedra.corners);
-            Geometry::new(mesh.points(), &tetrahedra, &faces)
+            let points = tetrahedra.points(mesh.points());
+            let faces = Faces::new(&points, &tetrahedra.corners);
+            Geometry::new(&points, &tetrahedra, &faces)
         });
         self.stats.faces_ms = ms(start);
         self.stats.cells = mesh.cells().len() as u64;
@@ -171,7 +172,7 @@ impl Renderer {
         if points.len() != mesh.points || !points.iter().all(|p| p.is_finite()) {
             return Err(Error::Mesh(format!("{} points, all finite, must take the place of as many", mesh.points)));
         }
-        self.pool.install(|| mesh.geometry.set_points(points));
+        self.pool.install(|| mesh.geometry.set_points(&mesh.tetrahedra.points(points)));
         if let Some(traverse) = &mut self.device {
             traverse.forget(Part::Points);
         }
