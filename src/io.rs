@@ -3,6 +3,7 @@
 mod data;
 mod legacy;
 mod number;
+mod unpack;
 mod vtu;
 
 use crate::error::{Error, Result};
@@ -13,12 +14,7 @@ use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 /// What Halite knows of but does not read: extension, type attribute of the XML file, and what would help.
-const REFUSED: [(&str, &str, &str); 14] = [
-    (
-        "pvtu",
-        "PUnstructuredGrid",
-        "a list of pieces, which Halite cannot read yet; open a piece, or save them as one .vtu",
-    ),
+const REFUSED: [(&str, &str, &str); 13] = [
     ("pvd", "Collection", "a list of files, which Halite cannot read; open one of the .vtu that it lists"),
     ("vtm", "vtkMultiBlockDataSet", MULTIBLOCK),
     ("vtmb", "vtkMultiBlockDataSet", MULTIBLOCK),
@@ -54,7 +50,7 @@ pub fn open(path: &Path, progress: &(dyn Fn(f64) + Sync)) -> Result<Mesh> {
     let text = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&start).trim_ascii_start();
     progress(0.0);
     let mesh = if text.first() == Some(&b'<') {
-        vtu::read(path, &mut file, progress)?
+        vtu::read(path, progress)?
     } else if text.get(..14).is_some_and(|tag| tag.eq_ignore_ascii_case(b"# vtk DataFile")) {
         legacy::read(path, &mut file)?
     } else {

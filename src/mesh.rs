@@ -112,12 +112,38 @@ impl Cells {
     }
 }
 
+/// VTK's cell type of a polyhedron.
+pub(crate) const POLYHEDRON: u8 = 42;
+
+/// The faces of the polyhedra among the cells of a mesh.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Polyhedra {
+    /// Cell `c` has the faces `cells[c]..cells[c + 1]`, none if it is no polyhedron; one entry more than cells, the first is 0.
+    pub cells: Vec<u64>,
+    /// Face `f` has the points `points[faces[f]..faces[f + 1]]`; one entry more than faces, the first is 0.
+    pub faces: Vec<u64>,
+    /// Point indices, around each face.
+    pub points: Vec<u32>,
+}
+
+impl Polyhedra {
+    /// The faces of cell `c`, each a list of points.
+    ///
+    /// # Panics
+    /// If `c` is no cell.
+    pub fn faces(&self, c: usize) -> impl Iterator<Item = &[u32]> {
+        let face = |f: u64| &self.points[self.faces[f as usize] as usize..self.faces[f as usize + 1] as usize];
+        (self.cells[c]..self.cells[c + 1]).map(face)
+    }
+}
+
 /// An unstructured grid: a value of this type cannot be malformed. Point coordinates may still be NaN or infinite:
 /// cells that touch such a point are left out when the cells are split.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Mesh {
     points: Vec<DVec3>,
     cells: Cells,
+    polyhedra: Option<Polyhedra>,
     point_arrays: Vec<Array>,
     cell_arrays: Vec<Array>,
 }
@@ -165,7 +191,30 @@ impl Mesh {
                 }
             }
         }
-        Ok(Mesh { points, cells, point_arrays, cell_arrays })
+        Ok(Mesh { points, cells, polyhedra: None, point_arrays, cell_arrays })
+    }
+
+    /// The same mesh, with the faces of its polyhedra; without, they are not drawn.
+    ///
+    /// # Errors
+    /// [`Error::Mesh`] if there are not as many entries as cells need, if they do not start at 0, decrease or pass the end of the
+    /// next list, or if a face names a point that does not exist.
+    pub fn with_polyhedra(self, polyhedra: Polyhedra) -> Result<Self> {
+        let Polyhedra { cells, faces, points } = &polyhedra;
+        let fits = |starts: &[u64], end: usize| {
+            starts.first() == Some(&0) && starts.is_sorted() && starts.last() == Some(&(end as u64))
+        };
+        if cells.len() != self.cells.len() + 1
+            || !fits(cells, faces.len().saturating_sub(1))
+            || !fits(faces, points.len())
+        {
+            return Err(Error::Mesh("the lists of its polyhedra's faces do not fit together".to_owned()));
+        }
+        if let Some(p) = points.iter().find(|p| **p as usize >= self.points.len()) {
+            let count = self.points.len();
+            return Err(Error::Mesh(format!("the face of a polyhedron names point {p}, but there are {count} points")));
+        }
+        Ok(Mesh { polyhedra: Some(polyhedra), ..self })
     }
 
     /// The points, in world coordinates.
@@ -176,6 +225,11 @@ impl Mesh {
     /// The cells, of every type that the file has.
     pub fn cells(&self) -> &Cells {
         &self.cells
+    }
+
+    /// The faces of its polyhedra.
+    pub fn polyhedra(&self) -> Option<&Polyhedra> {
+        self.polyhedra.as_ref()
     }
 
     /// The arrays with a value for each point.

@@ -73,6 +73,14 @@ impl<'a> Reference<'a> {
         if field.values().len() != count * n {
             return Err(Error::Field(format!("the field has {} values for {count} tuples", field.values().len())));
         }
+        // What the split adds is part of what is given.
+        let (points, values) = (
+            tetrahedra.points(points),
+            match field.association() {
+                Association::Point => tetrahedra.values(field.values(), n),
+                Association::Cell => field.values().into(),
+            },
+        );
         let used = || tetrahedra.corners.iter().flatten().filter_map(|&p| points.get(p as usize));
         let finite = || used().filter(|p| p.is_finite());
         let (lo, hi) = finite().fold((DVec3::MAX, DVec3::MIN), |(lo, hi), p| (lo.min(*p), hi.max(*p)));
@@ -84,7 +92,7 @@ impl<'a> Reference<'a> {
                 |corner: u32| if field.association() == Association::Point { Some(corner as usize) } else { cell };
             let value = |corner: u32| {
                 let start = tuple(corner)? * n;
-                let values = field.values().get(start..start + n)?;
+                let values = values.get(start..start + n)?;
                 let at = |k: usize| {
                     values.get(k).map_or(0.0, |&v| field.normal(k).mid + field.normal(k).half * f64::from(v))
                 };

@@ -220,11 +220,12 @@ impl Renderer {
         // Projected cells need no neighbours.
         let connected = self.project.is_none();
         let geometry = self.pool.install(|| {
+            let points = tetrahedra.points(mesh.points());
             if !connected {
-                return Geometry::unconnected(mesh.points(), &tetrahedra);
+                return Geometry::unconnected(&points, &tetrahedra);
             }
-            let faces = Faces::new(mesh.points(), &tetrahedra.corners);
-            Geometry::new(mesh.points(), &tetrahedra, &faces)
+            let faces = Faces::new(&points, &tetrahedra.corners);
+            Geometry::new(&points, &tetrahedra, &faces)
         });
         self.stats.faces_ms = ms(start);
         self.stats.cells = mesh.cells().len() as u64;
@@ -245,7 +246,7 @@ impl Renderer {
         if points.len() != mesh.points || !points.iter().all(|p| p.is_finite()) {
             return Err(Error::Mesh(format!("{} points, all finite, must take the place of as many", mesh.points)));
         }
-        self.pool.install(|| mesh.geometry.set_points(points));
+        self.pool.install(|| mesh.geometry.set_points(&mesh.tetrahedra.points(points)));
         if let Some(traverse) = &mut self.device {
             traverse.forget(Part::Points);
         }

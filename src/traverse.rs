@@ -5,6 +5,7 @@
 //! both on a GPU.
 
 pub mod boundary;
+pub mod contacts;
 pub mod cpu;
 pub(crate) mod gpu;
 
@@ -50,7 +51,7 @@ pub struct Geometry {
 }
 
 impl Geometry {
-    /// Prepares `tetrahedra`, whose corners index into `points`.
+    /// Prepares `tetrahedra`, whose corners index into `points`: see [`Tetrahedra::points`].
     pub fn new(points: &[DVec3], tetrahedra: &Tetrahedra, faces: &Faces) -> Self {
         let corners = &tetrahedra.corners;
         let [low, high] = bounds(points, corners);
@@ -99,7 +100,7 @@ impl Geometry {
         Self::new(points, tetrahedra, &Faces { neighbours, ..Faces::default() })
     }
 
-    /// Moves the points: `points` are the mesh's, in world coordinates. Cells keep their neighbours, so none may turn inside
+    /// Moves the points: `points` are as many as before, in world coordinates. Cells keep their neighbours, so none may turn inside
     /// out, and points that shared a position still must.
     pub fn set_points(&mut self, points: &[DVec3]) {
         let (centre, scale) = (self.centre, self.scale);
@@ -140,10 +141,14 @@ impl<const N: usize> Values<N> {
             Association::Point => ("points", points),
             Association::Cell => ("cells", cells),
         };
-        let (values, []) = field.values().as_chunks::<N>() else { return Err(Error::Field("uneven field".into())) };
-        if values.len() != count {
-            return Err(Error::Field(format!("the field has {} values for {count} {what}", values.len())));
+        if field.values().len() != count * N {
+            return Err(Error::Field(format!("the field has {} values for {count} {what}", field.values().len() / N)));
         }
+        let values = match field.association() {
+            Association::Point => tetrahedra.values(field.values(), N),
+            Association::Cell => field.values().into(),
+        };
+        let (values, []) = values.as_chunks::<N>() else { return Err(Error::Field("uneven field".into())) };
         let value = |i: u32| values[i as usize];
         if field.association() == Association::Cell {
             let cell = |t: u32| tetrahedra.cell.as_ref().map_or(t, |c| c[t as usize]);

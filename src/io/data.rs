@@ -1,25 +1,23 @@
 //! Data arrays of a VTK XML file: from ascii, base64 or raw bytes, packed or not, to typed numbers.
 //!
 //! Every size that a file states is checked against the bytes that it has before memory is taken. Arrays are decoded in
-//! chunks, in parallel, each chunk converted while it is in cache: an `Int64` connectivity never exists as such.
+//! chunks, in parallel, each chunk converted while it is in cache: an `Int64` connectivity never exists as such. What decodes
+//! deals with bytes; number types come up only where a chunk is parsed or converted, which keeps the code small.
 
 use super::Progress;
-use super::number::{Kind, Number};
+use super::number::{Kind, Number, with_kind};
+use super::unpack::{Codec, Unpacker};
 use crate::error::{Error, Result};
 use base64::Engine;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
-use flate2::{Decompress, FlushDecompress, Status};
 use rayon::prelude::*;
 use std::fmt::{Display, Formatter};
 use std::fs::File;
 use std::ops::Range;
-use std::path::Path;
+use std::path::PathBuf;
 
 /// Bytes of a chunk of an array that is not packed: small enough for the cache, large enough for a system call.
 const CHUNK: usize = 1 << 18;
-
-/// Deflate cannot expand a byte to more than this many.
-const MOST_PER_BYTE: u64 = 1032;
 
 /// Writers differ in how they end a base64 text.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
@@ -60,11 +58,14 @@ pub(super) enum Data {
     Appended(u64),
 }
 
+/// Converts a chunk: gets the index of its first number, the numbers as aligned bytes in the order of this machine, and the place
+/// of the results. Says what is wrong with them, if anything.
+pub(super) type Put<'p> = dyn Fn(usize, &[u8], &mut [u8]) -> Result<(), String> + Sync + 'p;
+
 /// The file that the arrays are in, and what its root element says of them all.
 #[derive(Debug)]
-pub(super) struct Store<'a> {
-    pub(super) path: &'a Path,
-    pub(super) file: &'a File,
+pub(super) struct Store {
+    pub(super) path: PathBuf,
     /// Length of the file in bytes.
     pub(super) length: u64,
     pub(super) big_endian: bool,
@@ -82,7 +83,7 @@ pub(super) struct Appended {
     pub(super) base64: bool,
 }
 
-/// Why an array cannot be read; [`Store::read`] adds its name.
+/// Why an array cannot be read; [`Store`] adds its name.
 enum Fault {
     Io(std::io::Error),
     Malformed(String),
@@ -101,126 +102,75 @@ impl From<String> for Fault {
     }
 }
 
-impl Store<'_> {
-    /// Reads the `count` numbers of an array, which must be of type `T`, and converts them: `put` gets the index of the first
-    /// number of a chunk, the numbers and the place of their results, and says what is wrong with them, if anything.
-    pub(super) fn read<T: Number, U: bytemuck::Pod + Send>(
-        &self,
-        array: &DataArray,
-        count: u64,
-        progress: &Progress<'_>,
-        put: impl Fn(usize, &[T], &mut [U]) -> Result<(), String> + Sync,
-    ) -> Result<Vec<U>> {
-        let put = |first, numbers: &[T], out: &mut [U]| {
-            progress.add(numbers.len());
-            put(first, numbers, out)
-        };
-        let result = match &array.data {
-            _ if count == 0 => Ok(Vec::new()),
-            Data::Ascii(ranges) => self.text(ranges).map_err(Fault::Io).and_then(|text| parse(&text, count, put)),
-            Data::Base64(ranges) => self.text(ranges).map_err(Fault::Io).and_then(|mut text| {
+impl Store {
+    /// Opens an array, to be counted or read.
+    pub(super) fn array<'a>(&'a self, array: &'a DataArray) -> Result<Contents<'a>> {
+        let named = |fault| self.named(array, fault);
+        let file = File::open(&self.path).map_err(|e| named(Fault::Io(e)))?;
+        let body = self.body(array, file).map_err(named)?;
+        Ok(Contents { store: self, array, body })
+    }
+
+    fn named(&self, array: &DataArray, fault: Fault) -> Error {
+        match fault {
+            Fault::Io(source) => Error::file(&self.path, source),
+            Fault::Malformed(what) => Error::malformed(&self.path, format!("{array}: {what}")),
+            Fault::Unsupported(what) => Error::unsupported(&self.path, format!("{array}: {what}")),
+        }
+    }
+
+    fn body(&self, array: &DataArray, file: File) -> Result<Body, Fault> {
+        let bytes = match &array.data {
+            Data::Ascii(ranges) => return Ok(Body::Text(text(&file, ranges)?)),
+            Data::Base64(ranges) => {
+                let mut text = text(&file, ranges)?;
                 text.retain(|c| !c.is_ascii_whitespace());
                 let end = text.len() as u64;
-                let source = Source::Memory(text);
-                self.decode(array, Bytes { source, base64: true, start: 0, end, skip: 0 }, count, put)
-            }),
-            Data::Appended(offset) => self.appended(*offset).and_then(|bytes| self.decode(array, bytes, count, put)),
-        };
-        result.map_err(|fault| match fault {
-            Fault::Io(source) => Error::file(self.path, source),
-            Fault::Malformed(what) => Error::malformed(self.path, format!("{array}: {what}")),
-            Fault::Unsupported(what) => Error::unsupported(self.path, format!("{array}: {what}")),
-        })
-    }
-
-    /// The text of an array between its tags, parts separated by a space.
-    fn text(&self, ranges: &[Range<u64>]) -> std::io::Result<Vec<u8>> {
-        let mut text = Vec::new();
-        for range in ranges {
-            let (at, start) = (text.len(), range.start);
-            text.resize(at + (range.end - start) as usize, 0);
-            text[at..]
-                .par_chunks_mut(CHUNK)
-                .enumerate()
-                .try_for_each(|(i, chunk)| read_at(self.file, start + (i * CHUNK) as u64, chunk))?;
-            text.push(b' ');
-        }
-        Ok(text)
-    }
-
-    fn appended(&self, offset: u64) -> Result<Bytes<'_>, Fault> {
-        let appended = self.appended.as_ref().ok_or_else(|| "the file has no <AppendedData>".to_owned())?;
-        let start = appended
-            .start
-            .checked_add(offset)
-            .filter(|start| *start <= self.length)
-            .ok_or_else(|| format!("its offset {offset} lies past the end of the file"))?;
-        let source = Source::File(self.file);
-        Ok(Bytes { source, base64: appended.base64, start, end: self.length, skip: 0 })
-    }
-
-    /// Decodes binary numbers.
-    fn decode<T: Number, U: bytemuck::Pod + Send>(
-        &self,
-        array: &DataArray,
-        bytes: Bytes<'_>,
-        count: u64,
-        put: impl Fn(usize, &[T], &mut [U]) -> Result<(), String> + Sync,
-    ) -> Result<Vec<U>, Fault> {
-        let size = size_of::<T>() as u64;
-        let total =
-            count.checked_mul(size).ok_or_else(|| format!("{count} numbers are more than any file can hold"))?;
-        let mut blocks = match self.compressor.as_deref() {
-            None => self.plain(array, bytes, total)?,
-            Some("vtkZLibDataCompressor") => self.packed(bytes)?,
-            Some(other) => {
-                return Err(Fault::Unsupported(format!(
-                    "it is compressed with {other}, which Halite cannot read yet; write the file with vtkZLibDataCompressor \
-                     or without compression"
-                )));
+                Bytes { source: Source::Memory(text), base64: true, start: 0, end, skip: 0 }
+            }
+            Data::Appended(offset) => {
+                let appended = self.appended.as_ref().ok_or_else(|| "the file has no <AppendedData>".to_owned())?;
+                let start = appended
+                    .start
+                    .checked_add(*offset)
+                    .filter(|start| *start <= self.length)
+                    .ok_or_else(|| format!("its offset {offset} lies past the end of the file"))?;
+                let source = Source::File(file);
+                Bytes { source, base64: appended.base64, start, end: self.length, skip: 0 }
             }
         };
-        if blocks.total != total {
-            return Err(format!("it holds {} bytes, but {count} numbers need {total}", blocks.total).into());
-        }
-        if !(blocks.size as u64).is_multiple_of(size) && blocks.total > blocks.size as u64 {
-            let whole = blocks.fill(total, false, |_, from: &[u8], to: &mut [u8]| {
-                to.copy_from_slice(from);
-                Ok(())
-            })?;
-            let source = Source::Memory(whole);
-            blocks = Blocks::plain(Bytes { source, base64: false, start: 0, end: total, skip: 0 }, total);
-        }
-        blocks.fill(count, self.big_endian != cfg!(target_endian = "big"), put)
+        Ok(Body::Blocks(match self.compressor.as_deref() {
+            None => self.plain(bytes)?,
+            Some(name) => {
+                let codec = Codec::from_name(name).ok_or_else(|| {
+                    let name = name.escape_debug();
+                    Fault::Unsupported(format!(
+                        "it is compressed with {name}, which Halite does not know; write the file anew"
+                    ))
+                })?;
+                self.packed(bytes, codec)?
+            }
+        }))
     }
 
-    /// The blocks of an array that is not compressed, and needs `total` bytes. Its header says how many it has; in point and
-    /// cell data there may be more, as some writers count wrongly (GetFEM) and VTK does not mind.
-    fn plain<'b>(&self, array: &DataArray, bytes: Bytes<'b>, total: u64) -> Result<Blocks<'b>, Fault> {
-        let stated = self.words(&bytes, 1)?[0];
-        let body = bytes.after(self.word)?;
-        if stated > total && array.section.ends_with("Data") {
-            tracing::warn!(
-                "{}: {array} has {stated} bytes; only {total} of them are needed and read",
-                self.path.display()
-            );
-        } else if stated != total {
-            return Err(format!("it holds {stated} bytes, but its numbers need {total}").into());
-        }
-        if total > body.length() {
-            return Err(format!("the file ends after {} of its {total} bytes", body.length()).into());
-        }
-        Ok(Blocks::plain(body, total))
+    /// The blocks of an array that is not compressed. Its header says how many bytes it has.
+    fn plain(&self, bytes: Bytes) -> Result<Blocks, Fault> {
+        let total = self.words(&bytes, 1)?[0];
+        Ok(Blocks { body: bytes.after(self.word)?, total, size: CHUNK, packed: None })
     }
 
-    /// The blocks of a zlib-compressed array. Its header: number of blocks, bytes of each once unpacked, bytes of the last if it
-    /// is not full (or 0), then the packed bytes of each.
-    fn packed<'b>(&self, bytes: Bytes<'b>) -> Result<Blocks<'b>, Fault> {
-        let head = self.words(&bytes, 3)?;
-        let (count, size, partial) = (head[0], head[1], head[2]);
+    /// The blocks of a compressed array. Its header: number of blocks, bytes of each once unpacked, bytes of the last if it is not
+    /// full (or 0), then the packed bytes of each.
+    fn packed(&self, bytes: Bytes, codec: Codec) -> Result<Blocks, Fault> {
+        let count = self.words(&bytes, 1)?[0];
+        if count == 0 {
+            return Ok(Blocks { body: bytes, total: 0, size: 1, packed: Some((codec, vec![0])) });
+        }
         if count > bytes.length() / self.word {
             return Err(format!("it says that it has {count} blocks, more than the file has bytes for").into());
         }
+        let head = self.words(&bytes, 3)?;
+        let (size, partial) = (head[1], head[2]);
         let last = if partial == 0 { size } else { partial };
         if count > 1 && (last > size || size == 0) {
             return Err(format!("its last block of {last} bytes is larger than the others of {size}").into());
@@ -238,18 +188,18 @@ impl Store<'_> {
         }
         for (i, packed) in packed.iter().enumerate() {
             let size = if i as u64 + 1 == count { last } else { size };
-            if size > packed.saturating_mul(MOST_PER_BYTE) {
+            if size > codec.most(*packed) {
                 return Err(format!("its block {i} of {packed} bytes cannot unpack to {size}").into());
             }
         }
-        let total = count.saturating_sub(1).saturating_mul(size).saturating_add(if count == 0 { 0 } else { last });
+        let total = (count - 1).saturating_mul(size).saturating_add(last);
         let size = if count == 1 { last } else { size };
         let size = usize::try_from(size).map_err(|_| format!("a block of {size} bytes is too large"))?;
-        Ok(Blocks { body, total, size, starts: Some(starts) })
+        Ok(Blocks { body, total, size, packed: Some((codec, starts)) })
     }
 
     /// The first `count` numbers of an array's header.
-    fn words(&self, bytes: &Bytes<'_>, count: u64) -> Result<Vec<u64>, Fault> {
+    fn words(&self, bytes: &Bytes, count: u64) -> Result<Vec<u64>, Fault> {
         let size = count.saturating_mul(self.word);
         if size > bytes.length() {
             return Err("the file ends inside its header".to_owned().into());
@@ -265,8 +215,9 @@ impl Store<'_> {
 }
 
 /// Random access to the bytes of an array, header included.
-struct Bytes<'a> {
-    source: Source<'a>,
+#[derive(Debug)]
+struct Bytes {
+    source: Source,
     base64: bool,
     /// Where in the source the bytes, or their base64 text, start.
     start: u64,
@@ -276,12 +227,13 @@ struct Bytes<'a> {
     skip: u64,
 }
 
-enum Source<'a> {
-    File(&'a File),
+#[derive(Debug)]
+enum Source {
+    File(File),
     Memory(Vec<u8>),
 }
 
-impl Source<'_> {
+impl Source {
     fn read(&self, at: u64, out: &mut [u8]) -> std::io::Result<()> {
         match self {
             Source::File(file) => read_at(file, at, out),
@@ -294,7 +246,7 @@ impl Source<'_> {
     }
 }
 
-impl Bytes<'_> {
+impl Bytes {
     /// How many bytes there are at most.
     fn length(&self) -> u64 {
         let stored = self.end - self.start;
@@ -340,70 +292,174 @@ impl Bytes<'_> {
     }
 }
 
+/// An array that was opened.
+#[derive(Debug)]
+pub(super) struct Contents<'a> {
+    store: &'a Store,
+    array: &'a DataArray,
+    body: Body,
+}
+
+#[derive(Debug)]
+enum Body {
+    Text(Vec<u8>),
+    Blocks(Blocks),
+}
+
 /// The numbers of an array as blocks that can be decoded one by one.
-struct Blocks<'a> {
-    body: Bytes<'a>,
+#[derive(Debug)]
+struct Blocks {
+    body: Bytes,
     /// Bytes of all blocks, unpacked.
     total: u64,
     /// Bytes of a block, unpacked; the last may have less.
     size: usize,
-    /// If they are packed: where each starts in the body, and the end of the last.
-    starts: Option<Vec<u64>>,
+    /// If they are packed: how, where each starts in the body, and the end of the last.
+    packed: Option<(Codec, Vec<u64>)>,
 }
 
-/// What a thread keeps from block to block.
-struct Scratch<T> {
-    numbers: Vec<T>,
-    packed: Vec<u8>,
-    inflate: Decompress,
-}
-
-impl<'a> Blocks<'a> {
-    fn plain(body: Bytes<'a>, total: u64) -> Self {
-        Blocks { body, total, size: CHUNK, starts: None }
+impl Contents<'_> {
+    /// How many numbers the array says it has.
+    pub(super) fn count(&self) -> u64 {
+        match &self.body {
+            Body::Text(text) => parts(text).par_iter().map(|part| tokens(part).count() as u64).sum(),
+            Body::Blocks(blocks) => blocks.total / self.array.kind.size() as u64,
+        }
     }
 
-    /// Decodes and converts all `count` numbers. `T` must fit into the blocks without a rest.
-    fn fill<T: Number, U: bytemuck::Pod + Send>(
-        &self,
-        count: u64,
-        swap: bool,
-        put: impl Fn(usize, &[T], &mut [U]) -> Result<(), String> + Sync,
-    ) -> Result<Vec<U>, Fault> {
-        let mut out = vec![U::zeroed(); usize::try_from(count).map_err(|_| "it is too large".to_owned())?];
-        let per_block = (self.size / size_of::<T>()).max(1);
-        let scratch = || Scratch { numbers: Vec::new(), packed: Vec::new(), inflate: Decompress::new(true) };
-        out.par_chunks_mut(per_block).enumerate().try_for_each_init(scratch, |scratch, (block, out)| {
-            let Scratch { numbers, packed, inflate } = scratch;
-            numbers.resize(out.len(), T::zeroed());
-            let bytes = bytemuck::cast_slice_mut(numbers);
-            match &self.starts {
-                None => self.body.read((block * self.size) as u64, bytes)?,
-                Some(starts) => {
-                    packed.resize((starts[block + 1] - starts[block]) as usize, 0);
-                    self.body.read(starts[block], packed)?;
-                    inflate.reset(true);
-                    let status = inflate.decompress(packed, bytes, FlushDecompress::Finish);
-                    if !matches!(status, Ok(Status::StreamEnd)) || inflate.total_out() != bytes.len() as u64 {
-                        return Err(Fault::Malformed(format!("its block {block} is not valid zlib data")));
-                    }
+    /// Reads the first `count` numbers, of all that there must be, and converts them.
+    pub(super) fn read<U: bytemuck::Pod>(self, count: u64, progress: &Progress<'_>, put: &Put<'_>) -> Result<Vec<U>> {
+        let mut out = Vec::new();
+        let result = self.check(count).and_then(|()| {
+            out = vec![U::zeroed(); usize::try_from(count).map_err(|_| "it is too large".to_owned())?];
+            let (bytes, size) = (bytemuck::cast_slice_mut(&mut out), size_of::<U>());
+            let put = |first, numbers: &[u8], out: &mut [u8]| {
+                progress.add(out.len() / size);
+                put(first, numbers, out)
+            };
+            match &self.body {
+                _ if count == 0 => Ok(()),
+                Body::Text(text) => parse(self.array.kind, text, bytes, size, &put),
+                Body::Blocks(blocks) => blocks.fill(
+                    self.array.kind,
+                    self.store.big_endian != cfg!(target_endian = "big"),
+                    bytes,
+                    size,
+                    &put,
+                ),
+            }
+        });
+        result.map(|()| out).map_err(|fault| self.store.named(self.array, fault))
+    }
+
+    /// Checks the array for `count` numbers. In point and cell data there may be more bytes, as some writers count wrongly (GetFEM)
+    /// and VTK does not mind.
+    fn check(&self, count: u64) -> Result<(), Fault> {
+        let Body::Blocks(blocks) = &self.body else {
+            let found = self.count();
+            return if found == count { Ok(()) } else { Err(format!("it holds {found} numbers, not {count}").into()) };
+        };
+        let total = count
+            .checked_mul(self.array.kind.size() as u64)
+            .ok_or_else(|| format!("{count} numbers are more than any file can hold"))?;
+        let stated = blocks.total;
+        let spare = blocks.packed.is_none() && stated > total && self.array.section.ends_with("Data");
+        if spare && count > 0 {
+            let path = self.store.path.display();
+            tracing::warn!("{path}: {} has {stated} bytes; only {total} of them are needed and read", self.array);
+        } else if !spare && stated != total {
+            return Err(format!("it holds {stated} bytes, but its numbers need {total}").into());
+        }
+        if blocks.packed.is_none() && total > blocks.body.length() {
+            return Err(format!("the file ends after {} of its {total} bytes", blocks.body.length()).into());
+        }
+        Ok(())
+    }
+}
+
+/// What a thread keeps from chunk to chunk.
+struct Scratch {
+    /// In words, for the alignment.
+    numbers: Vec<u64>,
+    unpacker: Unpacker,
+}
+
+impl Blocks {
+    /// Decodes and converts numbers of `kind` until `out` is full, `size` bytes for each.
+    fn fill(&self, kind: Kind, swap: bool, out: &mut [u8], size: usize, put: &Put<'_>) -> Result<(), Fault> {
+        if self.packed.is_some() && !self.size.is_multiple_of(kind.size()) && self.total > self.size as u64 {
+            // Blocks that cut numbers in two are put together first.
+            let count = self.total as usize;
+            let mut whole = vec![0; count];
+            self.fill(Kind::U8, false, &mut whole, 1, &|_, from: &[u8], to: &mut [u8]| {
+                to.copy_from_slice(from);
+                Ok(())
+            })?;
+            let body = Bytes { source: Source::Memory(whole), base64: false, start: 0, end: self.total, skip: 0 };
+            return Blocks { body, total: self.total, size: CHUNK, packed: None }.fill(kind, swap, out, size, put);
+        }
+        let per_block = (self.size / kind.size()).max(1);
+        let per_chunk = CHUNK / kind.size();
+        let scratch = || Scratch {
+            numbers: vec![0; per_block.min(per_chunk) * kind.size() / 8 + 1],
+            unpacker: Unpacker::default(),
+        };
+        out.par_chunks_mut(per_block * size).enumerate().try_for_each_init(scratch, |scratch, (block, out)| {
+            let Scratch { numbers, unpacker } = scratch;
+            if let Some((codec, starts)) = &self.packed {
+                let mut packed = unpacker.buffer((starts[block + 1] - starts[block]) as usize);
+                self.body.read(starts[block], &mut packed)?;
+                let whole = if block as u64 == (self.total - 1) / self.size as u64 {
+                    self.total as usize - block * self.size
+                } else {
+                    self.size
+                };
+                unpacker.start(*codec, packed, whole).map_err(|why| format!("its block {block} {why}"))?;
+            }
+            for (chunk, out) in out.chunks_mut(per_chunk * size).enumerate() {
+                let first = block * per_block + chunk * per_chunk;
+                let bytes = &mut bytemuck::cast_slice_mut(numbers)[..out.len() / size * kind.size()];
+                match self.packed {
+                    None => self.body.read((first * kind.size()) as u64, bytes)?,
+                    Some(_) => unpacker.more(bytes).map_err(|why| format!("its block {block} {why}"))?,
                 }
+                if swap {
+                    reverse(bytes, kind.size());
+                }
+                put(first, bytes, out)?;
             }
-            if swap {
-                numbers.iter_mut().for_each(|number| *number = number.swapped());
+            if self.packed.is_some() {
+                unpacker.end().map_err(|why| format!("its block {block} {why}"))?;
             }
-            Ok(put(block * per_block, numbers, out)?)
-        })?;
-        Ok(out)
+            Ok(())
+        })
     }
 }
 
-/// Parses the numbers of an ascii array.
-fn parse<T: Number, U: bytemuck::Pod + Send>(
-    mut text: &[u8],
-    count: u64,
-    put: impl Fn(usize, &[T], &mut [U]) -> Result<(), String> + Sync,
-) -> Result<Vec<U>, Fault> {
+/// Reverses the bytes of each number.
+fn reverse(bytes: &mut [u8], size: usize) {
+    if size > 1 {
+        bytes.chunks_exact_mut(size).for_each(<[u8]>::reverse);
+    }
+}
+
+/// The text of an array between its tags, parts separated by a space.
+fn text(file: &File, ranges: &[Range<u64>]) -> std::io::Result<Vec<u8>> {
+    let mut text = Vec::new();
+    for range in ranges {
+        let (at, start) = (text.len(), range.start);
+        text.resize(at + (range.end - start) as usize, 0);
+        text[at..]
+            .par_chunks_mut(CHUNK)
+            .enumerate()
+            .try_for_each(|(i, chunk)| read_at(file, start + (i * CHUNK) as u64, chunk))?;
+        text.push(b' ');
+    }
+    Ok(text)
+}
+
+/// Cuts a text into chunks, between numbers.
+fn parts(mut text: &[u8]) -> Vec<&[u8]> {
     let mut parts = Vec::new();
     while !text.is_empty() {
         let end = text.iter().skip(CHUNK).position(u8::is_ascii_whitespace).map_or(text.len(), |i| CHUNK + i);
@@ -411,31 +467,34 @@ fn parse<T: Number, U: bytemuck::Pod + Send>(
         parts.push(part);
         text = rest;
     }
+    parts
+}
+
+/// Parses the numbers of an ascii array, as many as `out` has place for.
+fn parse(kind: Kind, text: &[u8], out: &mut [u8], size: usize, put: &Put<'_>) -> Result<(), Fault> {
+    let parts = parts(text);
     let counts: Vec<usize> = parts.par_iter().map(|part| tokens(part).count()).collect();
-    let found: usize = counts.iter().sum();
-    if found as u64 != count {
-        return Err(format!("it holds {found} numbers, not {count}").into());
-    }
-    let mut out = vec![U::zeroed(); found];
-    let (mut rest, mut first) = (&mut out[..], 0);
+    let (mut rest, mut first) = (out, 0);
     let mut jobs = Vec::new();
     for (part, count) in parts.iter().zip(counts) {
-        let (place, after) = rest.split_at_mut(count);
+        let (place, after) = rest.split_at_mut(count * size);
         jobs.push((first, *part, place));
         (rest, first) = (after, first + count);
     }
-    jobs.into_par_iter().try_for_each(|(first, part, place)| {
-        let number = |token: &[u8]| {
-            let number = std::str::from_utf8(token).ok().and_then(T::parse);
-            number.ok_or_else(|| {
-                let token = String::from_utf8_lossy(&token[..token.len().min(40)]);
-                format!("\"{}\" is not a number of its type", token.escape_debug())
-            })
-        };
-        let numbers = tokens(part).map(number).collect::<Result<Vec<T>, String>>()?;
-        put(first, &numbers, place)
-    })?;
-    Ok(out)
+    jobs.into_par_iter().try_for_each(
+        |(first, part, place)| with_kind!(kind, T => put(first, bytemuck::cast_slice(&numbers::<T>(part)?), place)),
+    )?;
+    Ok(())
+}
+
+fn numbers<T: Number>(text: &[u8]) -> Result<Vec<T>, String> {
+    let number = |token: &[u8]| {
+        std::str::from_utf8(token).ok().and_then(T::parse).ok_or_else(|| {
+            let token = String::from_utf8_lossy(&token[..token.len().min(40)]);
+            format!("\"{}\" is not a number of its type", token.escape_debug())
+        })
+    };
+    tokens(text).map(number).collect()
 }
 
 fn tokens(text: &[u8]) -> impl Iterator<Item = &[u8]> {

@@ -2,7 +2,7 @@
 
 use super::{refuse, validated};
 use crate::error::{Error, Result};
-use crate::mesh::{Array, Cells, Mesh, Values};
+use crate::mesh::{Array, Cells, Mesh, POLYHEDRON, Polyhedra, Values};
 use glam::DVec3;
 use std::fs::File;
 use std::io::{Read, Seek};
@@ -17,6 +17,7 @@ use vtkio::model::{Attribute, CellType, DataSet, IOBuffer, Piece, UnstructuredGr
 pub(super) fn read(path: &Path, file: &mut File) -> Result<Mesh> {
     let mut bytes = Vec::new();
     file.rewind().and_then(|()| file.read_to_end(&mut bytes)).map_err(|e| Error::file(path, e))?;
+    skip_field_data(&mut bytes);
     let help = "; a .vtu file of the same grid will do";
     let parsed = catch_unwind(|| match vtkio::parser::parse_be(&bytes) {
         Ok((rest, vtk)) => Some((rest.len(), vtk.data)),
@@ -69,7 +70,107 @@ fn mesh(path: &Path, piece: UnstructuredGridPiece) -> Result<Mesh> {
         }
     };
     let cells = Cells { types, offsets, connectivity };
-    validated(path, Mesh::new(points, cells, arrays(piece.data.point), arrays(piece.data.cell)))
+    let (cells, polyhedra) = unfold(cells)
+        .map_err(|c| fail(&format!("the faces of polyhedron {c} do not fit the numbers that CELLS lists for it")))?;
+    let mesh = Mesh::new(points, cells, arrays(piece.data.point), arrays(piece.data.cell));
+    validated(path, mesh.and_then(|mesh| if let Some(p) = polyhedra { mesh.with_polyhedra(p) } else { Ok(mesh) }))
+}
+
+/// In these files a polyhedron has no points, but its faces: their number, and for each the number of its points, and these. Takes
+/// them apart; the error is the cell for which that fails.
+fn unfold(cells: Cells) -> Result<(Cells, Option<Polyhedra>), usize> {
+    if !cells.types.contains(&POLYHEDRON) || cells.offsets.len() != cells.types.len() + 1 {
+        return Ok((cells, None));
+    }
+    let (mut connectivity, mut offsets) = (Vec::new(), vec![0]);
+    let mut polyhedra = Polyhedra { cells: vec![0], faces: vec![0], points: vec![] };
+    for (c, &vtk_type) in cells.types.iter().enumerate() {
+        let range = (cells.offsets[c] as usize)..(cells.offsets[c + 1] as usize);
+        let mut rest = cells.connectivity.get(range).ok_or(c)?;
+        if vtk_type == POLYHEDRON {
+            let first = polyhedra.points.len();
+            for _ in 0..*rest.split_off_first().ok_or(c)? {
+                let n = *rest.split_off_first().ok_or(c)? as usize;
+                polyhedra.points.extend_from_slice(rest.split_off(..n).ok_or(c)?);
+                polyhedra.faces.push(polyhedra.points.len() as u64);
+            }
+            let mut own = polyhedra.points[first..].to_vec();
+            own.sort_unstable();
+            own.dedup();
+            connectivity.extend(own);
+        } else {
+            connectivity.extend_from_slice(rest);
+        }
+        offsets.push(connectivity.len() as u64);
+        polyhedra.cells.push(polyhedra.faces.len() as u64 - 1);
+    }
+    Ok((Cells { types: cells.types, offsets, connectivity }, Some(polyhedra)))
+}
+
+/// Takes out the field data between DATASET and POINTS, such as the time of a step, which vtkio does not expect there. Leaves
+/// what does not look like that.
+fn skip_field_data(bytes: &mut Vec<u8>) {
+    let line = |at: usize| {
+        let end = bytes[at..].iter().position(|b| *b == b'\n').map_or(bytes.len(), |n| at + n);
+        (String::from_utf8_lossy(&bytes[at..end]).into_owned(), (end + 1).min(bytes.len()))
+    };
+    let (mut at, mut lines) = (0, Vec::new());
+    for _ in 0..4 {
+        let (text, next) = line(at);
+        lines.push(text);
+        at = next;
+    }
+    let (binary, start) = (lines[2].trim().eq_ignore_ascii_case("BINARY"), at);
+    let (field, mut at) = line(at);
+    let words: Vec<&str> = field.split_whitespace().collect();
+    let (["FIELD", _, count], true) = (&words[..], lines[3].starts_with("DATASET")) else { return };
+    for _ in 0..count.parse().unwrap_or(0_usize) {
+        let (mut text, mut next) = line(at);
+        while text.trim().is_empty() && next > at {
+            at = next;
+            (text, next) = line(at);
+        }
+        let words: Vec<&str> = text.split_whitespace().collect();
+        let [_, components, tuples, kind] = words[..] else { return };
+        let (Ok(components), Ok(tuples)) = (components.parse::<usize>(), tuples.parse::<usize>()) else { return };
+        let Some(numbers) = components.checked_mul(tuples) else { return };
+        let size = match kind {
+            "char" | "unsigned_char" | "signed_char" => 1,
+            "short" | "unsigned_short" => 2,
+            "int" | "unsigned_int" | "float" | "vtkIdType" => 4,
+            "long" | "unsigned_long" | "double" | "vtktypeint64" | "vtktypeuint64" => 8,
+            // Of strings, each takes a line in ascii.
+            "string" if !binary => 0,
+            _ => return,
+        };
+        at = next;
+        if size == 0 {
+            for _ in 0..numbers.min(bytes.len()) {
+                at = line(at).1;
+            }
+        } else if binary {
+            let Some(end) = numbers.checked_mul(size).and_then(|n| at.checked_add(n)).filter(|end| *end <= bytes.len())
+            else {
+                return;
+            };
+            at = end;
+        } else {
+            for _ in 0..numbers {
+                if at == bytes.len() {
+                    return;
+                }
+                at += bytes[at..].iter().take_while(|b| b.is_ascii_whitespace()).count();
+                at += bytes[at..].iter().take_while(|b| !b.is_ascii_whitespace()).count();
+            }
+        }
+    }
+    // Up to the next keyword; a description of the arrays may be in between.
+    if let Some(points) = bytes[at..].windows(7).position(|w| w.eq_ignore_ascii_case(b"\nPOINTS")) {
+        let between = String::from_utf8_lossy(&bytes[at..at + points]).into_owned();
+        if between.trim().is_empty() || between.trim_start().starts_with("METADATA") {
+            bytes.drain(start..=at + points);
+        }
+    }
 }
 
 fn arrays(attributes: Vec<Attribute>) -> Vec<Array> {

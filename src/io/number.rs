@@ -3,6 +3,22 @@
 use crate::mesh::Values;
 use std::fmt::Display;
 
+/// Runs `$body` with the type `$T` being the one that a [`Kind`] stands for.
+macro_rules! with_kind {
+    ($kind:expr, $T:ident => $body:expr) => {
+        with_kind!($kind, $T => $body; I8 i8, U8 u8, I16 i16, U16 u16, I32 i32, U32 u32, I64 i64, U64 u64, F32 f32, F64 f64)
+    };
+    ($kind:expr, $T:ident => $body:expr; $($variant:ident $type:ty),*) => {
+        match $kind {
+            $($crate::io::number::Kind::$variant => {
+                type $T = $type;
+                $body
+            })*
+        }
+    };
+}
+pub(super) use with_kind;
+
 /// A number type that a data array may be made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs, reason = "each variant is named after its type")]
@@ -36,30 +52,17 @@ impl Kind {
             _ => return None,
         })
     }
-}
 
-/// Runs `$body` with the type `$T` being the one that a [`Kind`] stands for.
-macro_rules! with_kind {
-    ($kind:expr, $T:ident => $body:expr) => {
-        with_kind!($kind, $T => $body; I8 i8, U8 u8, I16 i16, U16 u16, I32 i32, U32 u32, I64 i64, U64 u64, F32 f32, F64 f64)
-    };
-    ($kind:expr, $T:ident => $body:expr; $($variant:ident $type:ty),*) => {
-        match $kind {
-            $($crate::io::number::Kind::$variant => {
-                type $T = $type;
-                $body
-            })*
-        }
-    };
+    /// Bytes of a number.
+    pub(super) fn size(self) -> usize {
+        with_kind!(self, T => size_of::<T>())
+    }
 }
-pub(super) use with_kind;
 
 /// One of the ten number types.
 pub(super) trait Number: bytemuck::Pod + Send + Sync + Display {
     /// A token of an ascii array. Whole numbers may be written as floats.
     fn parse(token: &str) -> Option<Self>;
-    /// The number with its bytes in reverse.
-    fn swapped(self) -> Self;
     /// The number as an index: none if it is negative or not whole.
     fn index(self) -> Option<u64>;
     /// The nearest f64.
@@ -76,9 +79,6 @@ macro_rules! whole {
                     let float: f64 = token.parse().ok()?;
                     (float as $T as f64 == float).then_some(float as $T)
                 })
-            }
-            fn swapped(self) -> Self {
-                self.swap_bytes()
             }
             fn index(self) -> Option<u64> {
                 u64::try_from(self).ok()
@@ -99,9 +99,6 @@ macro_rules! float {
         impl Number for $T {
             fn parse(token: &str) -> Option<Self> {
                 token.parse().ok().or_else(|| special(token).map(|f| f as $T))
-            }
-            fn swapped(self) -> Self {
-                $T::from_bits(self.to_bits().swap_bytes())
             }
             fn index(self) -> Option<u64> {
                 let index = self as u64;

@@ -4,7 +4,7 @@ use super::data::{Appended, Data, DataArray, Store};
 use super::number::{Kind, Number, with_kind};
 use super::{Progress, refuse, validated};
 use crate::error::{Error, Result};
-use crate::mesh::{Array, Cells, Mesh};
+use crate::mesh::{Array, Cells, Mesh, POLYHEDRON, Polyhedra};
 use glam::DVec3;
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
@@ -13,17 +13,39 @@ use std::collections::{BTreeSet, HashMap};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Seek};
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
-/// Reads the unstructured grid in a VTK XML file.
-pub(super) fn read(path: &Path, file: &mut File, tell: &(dyn Fn(f64) + Sync)) -> Result<Mesh> {
-    let length = file.metadata().and_then(|metadata| file.rewind().map(|()| metadata.len()));
-    let length = length.map_err(|e| Error::file(path, e))?;
-    let (store, pieces) = Head::read(path, file, length)?;
+/// Reads the unstructured grid in a VTK XML file, or in the files that it lists.
+pub(super) fn read(path: &Path, tell: &(dyn Fn(f64) + Sync)) -> Result<Mesh> {
+    let head = Head::read(path)?;
+    let mut files = vec![];
+    if head.is_list {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        for source in &head.sources {
+            let piece = folder.join(source);
+            let missing = |e: std::io::Error| {
+                let what = format!("it lists {}, which cannot be read: {e}", piece.display());
+                Error::malformed(path, what)
+            };
+            File::open(&piece).map_err(missing)?;
+            let head = Head::read(&piece)?;
+            if head.is_list {
+                return Err(Error::malformed(path, format!("it lists {}, which is a list itself", piece.display())));
+            }
+            files.push(head);
+        }
+    } else {
+        files.push(head);
+    }
+    let (mut stores, mut pieces) = (vec![], vec![]);
+    for file in files {
+        pieces.extend(file.pieces.into_iter().map(|piece| Piece { store: stores.len(), ..piece }));
+        stores.push(file.store);
+    }
     let expected = pieces.iter().map(Piece::expected).sum::<f64>().max(1.0);
     let progress = Progress { tell, expected, done: Mutex::new(0) };
-    Grid { store, pieces, progress }.mesh()
+    Grid { path, stores, pieces, progress }.mesh()
 }
 
 /// The elements of a piece that hold data arrays.
@@ -54,13 +76,22 @@ impl Section {
 /// A piece of the grid as the head describes it.
 #[derive(Debug, Default)]
 struct Piece {
+    /// Which file it is in.
+    store: usize,
     points: u64,
     cells: u64,
+    /// Lagrange hexahedra are numbered as before VTK 9.
+    old_numbering: bool,
     /// The arrays of each section.
     arrays: [Vec<DataArray>; 4],
 }
 
 impl Piece {
+    /// An array that describes cells.
+    fn find(&self, name: &str) -> Option<&DataArray> {
+        self.arrays(Section::Cells).iter().find(|array| array.name == name)
+    }
+
     fn arrays(&self, section: Section) -> &[DataArray] {
         &self.arrays[section as usize]
     }
@@ -89,21 +120,38 @@ enum Element {
     Section(Section),
     /// A data array that is read.
     Array(Section),
+    /// The grid of a file that lists others.
+    List,
     Other,
 }
 
 /// The state of reading the head of a file.
-struct Head<'a> {
-    store: Store<'a>,
+struct Head {
+    store: Store,
     pieces: Vec<Piece>,
     open: Vec<Element>,
+    /// Whether it lists files, and which.
+    is_list: bool,
+    sources: Vec<PathBuf>,
+    /// Lagrange hexahedra are numbered as before VTK 9.
+    old_numbering: bool,
 }
 
-impl<'a> Head<'a> {
+impl Head {
     /// Reads the XML up to the appended data, and skips the text of all elements.
-    fn read(path: &'a Path, file: &'a File, length: u64) -> Result<(Store<'a>, Vec<Piece>)> {
-        let store = Store { path, file, length, big_endian: false, word: 4, compressor: None, appended: None };
-        let mut head = Head { store, pieces: Vec::new(), open: Vec::new() };
+    fn read(path: &Path) -> Result<Self> {
+        let file = File::open(path).map_err(|e| Error::file(path, e))?;
+        let length = file.metadata().map_err(|e| Error::file(path, e))?.len();
+        let store =
+            Store { path: path.to_owned(), length, big_endian: false, word: 4, compressor: None, appended: None };
+        let mut head = Head {
+            store,
+            pieces: Vec::new(),
+            open: Vec::new(),
+            is_list: false,
+            sources: Vec::new(),
+            old_numbering: false,
+        };
         let mut reader = Reader::from_reader(BufReader::with_capacity(1 << 18, file));
         let mut buffer = Vec::new();
         loop {
@@ -139,14 +187,14 @@ impl<'a> Head<'a> {
                 head.add_text(*section, text);
             }
         }
-        if head.pieces.is_empty() {
+        if head.pieces.is_empty() && head.sources.is_empty() {
             return Err(head.malformed("there is no <Piece> in it"));
         }
-        Ok((head.store, head.pieces))
+        Ok(head)
     }
 
     fn malformed(&self, what: impl Into<String>) -> Error {
-        Error::malformed(self.store.path, what)
+        Error::malformed(&self.store.path, what)
     }
 
     /// Takes in what a tag says.
@@ -159,11 +207,19 @@ impl<'a> Head<'a> {
                 let other = other.escape_debug();
                 return Err(self.malformed(format!("this is no VTK file: its first element is <{other}>")));
             }
-            (Some(Element::File), "UnstructuredGrid") => Element::Grid,
+            (Some(Element::File), "UnstructuredGrid") if !self.is_list => Element::Grid,
+            (Some(Element::File), "PUnstructuredGrid") if self.is_list => Element::List,
+            (Some(Element::List), "Piece") => {
+                let source = self.attribute(tag, "Source")?;
+                let source = source.ok_or_else(|| self.malformed("a <Piece> has no Source"))?;
+                self.sources.push(source.into());
+                Element::Other
+            }
             (Some(Element::Grid), "Piece") => {
                 let piece = Piece {
                     points: self.count(tag, "NumberOfPoints")?,
                     cells: self.count(tag, "NumberOfCells")?,
+                    old_numbering: self.old_numbering,
                     ..Piece::default()
                 };
                 self.pieces.push(piece);
@@ -179,9 +235,14 @@ impl<'a> Head<'a> {
 
     fn root(&mut self, tag: &BytesStart<'_>) -> Result<Element> {
         let kind = self.attribute(tag, "type")?.unwrap_or_default();
-        if kind != "UnstructuredGrid" {
-            return Err(refuse(self.store.path, &kind));
+        self.is_list = kind == "PUnstructuredGrid";
+        if kind != "UnstructuredGrid" && !self.is_list {
+            return Err(refuse(&self.store.path, &kind));
         }
+        let version = self.attribute(tag, "version")?.unwrap_or_default();
+        let (major, minor) = version.split_once('.').unwrap_or((&version, "0"));
+        let number = |text: &str| text.trim().parse::<u32>().unwrap_or(0);
+        self.old_numbering = (number(major), number(minor)) < (2, 1);
         let one_of = |head: &Self, name: &str, first: &str, second: &str| -> Result<bool> {
             match head.attribute(tag, name)? {
                 Some(value) if value == second => Ok(true),
@@ -296,117 +357,245 @@ fn underscore(input: &mut (impl BufRead + Seek)) -> std::io::Result<Option<u64>>
 
 /// A grid whose head has been read.
 struct Grid<'a> {
-    store: Store<'a>,
+    path: &'a Path,
+    stores: Vec<Store>,
     pieces: Vec<Piece>,
     progress: Progress<'a>,
+}
+
+/// The cells of a piece. Offsets and all other lists are as in the file, without the 0 in front.
+#[derive(Default)]
+struct Topology {
+    cells: Cells,
+    polyhedra: Option<Polyhedra>,
 }
 
 impl Grid<'_> {
     /// Reads the arrays, and makes one mesh of all pieces.
     fn mesh(&self) -> Result<Mesh> {
-        let path = self.store.path;
         let points = self.pieces.iter().fold(0u64, |sum, piece| sum.saturating_add(piece.points));
         if points >= u64::from(u32::MAX) {
-            return Err(Error::unsupported(path, format!("{points} points are more than Halite can index (2^32 - 2)")));
+            let what = format!("{points} points are more than Halite can index (2^32 - 2)");
+            return Err(Error::unsupported(self.path, what));
         }
         let data = || rayon::join(|| self.data(Section::PointData), || self.data(Section::CellData));
-        let (cells, (points, (point_arrays, cell_arrays))) =
-            rayon::join(|| self.cells(), || rayon::join(|| self.points(), data));
-        validated(path, Mesh::new(points?, cells?, point_arrays?, cell_arrays?))
+        let (topology, (points, (point_arrays, cell_arrays))) =
+            rayon::join(|| self.topology(), || rayon::join(|| self.points(), data));
+        let (points, Topology { cells, polyhedra }) = (points?, topology?);
+        let mesh = Mesh::new(points, cells, point_arrays?, cell_arrays?);
+        let mesh = mesh.and_then(|mesh| match polyhedra {
+            Some(polyhedra) => mesh.with_polyhedra(polyhedra),
+            None => Ok(mesh),
+        });
+        validated(self.path, mesh)
+    }
+
+    fn store(&self, piece: &Piece) -> &Store {
+        &self.stores[piece.store]
+    }
+
+    fn malformed(&self, piece: &Piece, what: impl Into<String>) -> Error {
+        Error::malformed(&self.store(piece).path, what)
     }
 
     fn points(&self) -> Result<Vec<DVec3>> {
         let read = |(i, piece): (usize, &Piece)| {
-            let fail = |what: &str| Error::malformed(self.store.path, format!("the Points of piece {i} {what}"));
+            let fail = |what: &str| self.malformed(piece, format!("the Points of piece {i} {what}"));
             match piece.arrays(Section::Points).first() {
                 None if piece.points == 0 => Ok(Vec::new()),
                 None => Err(fail("are missing")),
                 Some(array) if array.components != 3 => {
                     Err(fail(&format!("have {} components, not 3", array.components)))
                 }
-                Some(array) => self.floats(array, piece.points),
+                Some(array) => self.floats(piece, array, piece.points),
             }
         };
         let parts = self.pieces.par_iter().enumerate().map(read).collect::<Result<Vec<_>>>()?;
         Ok(joined(parts).par_chunks_exact(3).map(DVec3::from_slice).collect())
     }
 
-    fn cells(&self) -> Result<Cells> {
+    fn topology(&self) -> Result<Topology> {
         let bases = self.pieces.iter().scan(0, |base, piece| {
             *base += piece.points;
             Some(*base - piece.points)
         });
         let pieces: Vec<(u64, &Piece)> = bases.zip(&self.pieces).collect();
-        let read = |(i, (base, piece)): (usize, &(u64, &Piece))| self.cells_of(i, piece, *base);
+        let read = |(i, (base, piece)): (usize, &(u64, &Piece))| self.topology_of(i, piece, *base);
         let parts = pieces.par_iter().enumerate().map(read).collect::<Result<Vec<_>>>()?;
-        let (mut types, mut connectivity, mut offsets) = (Vec::new(), Vec::new(), vec![]);
-        for part in parts {
-            types.push(part.types);
-            connectivity.push(part.connectivity);
-            if offsets.is_empty() {
-                offsets = part.offsets;
-                offsets.insert(0, 0);
-            } else {
-                let base = offsets.last().copied().unwrap_or_default();
-                offsets.extend(part.offsets.iter().map(|end| base.saturating_add(*end)));
+        let has_polyhedra = parts.iter().any(|part| part.polyhedra.is_some());
+        let (mut types, mut connectivity, mut offsets) = (vec![], vec![], vec![]);
+        let (mut of_cells, mut faces, mut points) = (vec![], vec![], vec![]);
+        for Topology { cells, polyhedra } in parts {
+            let n = cells.types.len();
+            types.push(cells.types);
+            connectivity.push(cells.connectivity);
+            append(&mut offsets, cells.offsets);
+            if has_polyhedra {
+                let polyhedra = polyhedra.unwrap_or_default();
+                append(&mut of_cells, if polyhedra.cells.is_empty() { vec![0; n] } else { polyhedra.cells });
+                append(&mut faces, polyhedra.faces);
+                points.push(polyhedra.points);
             }
         }
-        Ok(Cells { types: joined(types), offsets, connectivity: joined(connectivity) })
+        let closed = |mut list: Vec<u64>| {
+            if list.is_empty() {
+                list.push(0);
+            }
+            list
+        };
+        let polyhedra = Polyhedra { cells: closed(of_cells), faces: closed(faces), points: joined(points) };
+        let cells = Cells { types: joined(types), offsets: closed(offsets), connectivity: joined(connectivity) };
+        Ok(Topology { cells, polyhedra: has_polyhedra.then_some(polyhedra) })
     }
 
-    /// The cells of piece `i`, whose points come after `base` others. Their offsets are the ends of cells, as in the file.
-    fn cells_of(&self, i: usize, piece: &Piece, base: u64) -> Result<Cells> {
+    /// The cells of piece `i`, whose points come after `base` others.
+    fn topology_of(&self, i: usize, piece: &Piece, base: u64) -> Result<Topology> {
         if piece.cells == 0 {
-            return Ok(Cells::default());
+            return Ok(Topology::default());
         }
         let find = |name: &str| {
-            let found = piece.arrays(Section::Cells).iter().find(|array| array.name == name);
-            found.ok_or_else(|| {
-                Error::malformed(self.store.path, format!("the Cells of piece {i} have no array \"{name}\""))
-            })
+            let found = piece.find(name);
+            found.ok_or_else(|| self.malformed(piece, format!("the Cells of piece {i} have no array \"{name}\"")))
         };
         let (offsets, types, connectivity) = (find("offsets")?, find("types")?, find("connectivity")?);
-        let offsets = self.indices(offsets, piece.cells, Some, |cell, _| {
+        let offsets = self.indices(piece, offsets, Some(piece.cells), Some, |cell, _| {
             format!("the offset of cell {cell} is not a whole number from 0 up")
         })?;
         let narrow = |kind| u8::try_from(kind).ok();
-        let types =
-            self.indices(types, piece.cells, narrow, |cell, _| format!("the type of cell {cell} is not in 0..=255"))?;
+        let types = self.indices(piece, types, Some(piece.cells), narrow, |cell, _| {
+            format!("the type of cell {cell} is not in 0..=255")
+        })?;
         let length = offsets.last().copied().unwrap_or_default();
         let shift = |point| (point < piece.points).then(|| (base + point) as u32);
-        let connectivity = self.indices(connectivity, length, shift, |entry, point| {
+        let mut connectivity = self.indices(piece, connectivity, Some(length), shift, |entry, point| {
             let cell = offsets.partition_point(|end| *end <= entry as u64);
-            let point = point.map_or("a negative point".to_owned(), |point| format!("point {point}"));
-            format!("cell {cell} names {point}, but there are {} points", piece.points)
+            format!("cell {cell} names {}, but there are {} points", told(point), piece.points)
         })?;
-        Ok(Cells { types, offsets, connectivity })
+        if piece.old_numbering && offsets.is_sorted() && length == connectivity.len() as u64 {
+            renumber(&types, &offsets, &mut connectivity);
+        }
+        let polyhedra = if types.contains(&POLYHEDRON) { self.polyhedra_of(piece, &types, base)? } else { None };
+        Ok(Topology { cells: Cells { types, offsets, connectivity }, polyhedra })
     }
 
-    /// Reads indices of any number type. `check` turns each into what is kept, or `explain` says what is wrong with it: it gets
-    /// the place of the number, and its value if it is a whole number from 0 up.
-    fn indices<U: bytemuck::Pod + Send>(
+    /// The faces of a piece's polyhedra, if it has any: in the layout of VTK 9.4, or in that before.
+    fn polyhedra_of(&self, piece: &Piece, types: &[u8], base: u64) -> Result<Option<Polyhedra>> {
+        let point = |point| (point < piece.points).then(|| (base + point) as u32);
+        let no_point =
+            |face: &str, p: Option<u64>| format!("{face} names {}, but there are {} points", told(p), piece.points);
+        let no_index = |_: usize, _: Option<u64>| "an entry is not a whole number from 0 up".to_owned();
+        if let (Some(points), Some(faces), Some(lists), Some(cells)) = (
+            piece.find("face_connectivity"),
+            piece.find("face_offsets"),
+            piece.find("polyhedron_to_faces"),
+            piece.find("polyhedron_offsets"),
+        ) {
+            let cells = self.indices(piece, cells, Some(piece.cells), Some, no_index)?;
+            let lists = self.indices(piece, lists, None, Some, no_index)?;
+            let ends = self.indices(piece, faces, None, Some, no_index)?;
+            let points = self.indices(piece, points, None, point, |i, p| {
+                no_point(&format!("face {}", ends.partition_point(|end| *end <= i as u64)), p)
+            })?;
+            let fits =
+                |ends: &[u64], length: usize| ends.is_sorted() && ends.last().is_none_or(|end| *end <= length as u64);
+            if !fits(&cells, lists.len()) || !fits(&ends, points.len()) {
+                return Err(self.malformed(piece, "the lists of the polyhedra's faces do not fit together"));
+            }
+            let mut polyhedra = Polyhedra::default();
+            let mut start = 0;
+            for (cell, end) in cells.iter().enumerate() {
+                for face in &lists[start as usize..*end as usize] {
+                    let Some(end) = ends.get(*face as usize).filter(|_| *face < ends.len() as u64) else {
+                        let what = format!("polyhedron {cell} names face {face}, but there are {} faces", ends.len());
+                        return Err(self.malformed(piece, what));
+                    };
+                    let from = if *face == 0 { 0 } else { ends[*face as usize - 1] };
+                    polyhedra.points.extend_from_slice(&points[from as usize..*end as usize]);
+                    polyhedra.faces.push(polyhedra.points.len() as u64);
+                }
+                start = *end;
+                polyhedra.cells.push(polyhedra.faces.len() as u64);
+            }
+            return Ok(Some(polyhedra));
+        }
+        let (Some(stream), Some(ends)) = (piece.find("faces"), piece.find("faceoffsets")) else {
+            return Err(self.malformed(piece, "it has polyhedra, but no arrays that tell their faces"));
+        };
+        // Where the faces of each polyhedron end in the stream; −1 for other cells.
+        let ends = self.signed(piece, ends, piece.cells)?;
+        let stream = self.indices(piece, stream, None, Some, no_index)?;
+        let mut polyhedra = Polyhedra::default();
+        let mut at = 0;
+        for (cell, end) in ends.iter().enumerate() {
+            if let (Ok(end), true) = (usize::try_from(*end), types[cell] == POLYHEDRON) {
+                let short =
+                    || self.malformed(piece, format!("the faces of polyhedron {cell} do not fit its offset {end}"));
+                // The number of faces; for each, the number of its points, and these.
+                let mut rest = stream.get(at..end).ok_or_else(short)?;
+                let mut count = *rest.split_off_first().ok_or_else(short)?;
+                while count > 0 {
+                    let n = usize::try_from(*rest.split_off_first().ok_or_else(short)?).map_err(|_| short())?;
+                    for p in rest.split_off(..n).ok_or_else(short)? {
+                        let p = point(*p)
+                            .ok_or_else(|| self.malformed(piece, no_point(&format!("polyhedron {cell}"), Some(*p))))?;
+                        polyhedra.points.push(p);
+                    }
+                    polyhedra.faces.push(polyhedra.points.len() as u64);
+                    count -= 1;
+                }
+                at = end;
+            }
+            polyhedra.cells.push(polyhedra.faces.len() as u64);
+        }
+        Ok(Some(polyhedra))
+    }
+
+    /// Reads indices of any number type, all that there are or so many. `check` turns each into what is kept, or `explain` says what
+    /// is wrong with it: it gets the place of the number, and its value if it is a whole number from 0 up.
+    fn indices<U: bytemuck::Pod>(
         &self,
+        piece: &Piece,
         array: &DataArray,
-        count: u64,
+        count: Option<u64>,
         check: impl Fn(u64) -> Option<U> + Sync,
         explain: impl Fn(usize, Option<u64>) -> String + Sync,
     ) -> Result<Vec<U>> {
-        with_kind!(array.kind, T => self.store.read(array, count, &self.progress, |first, numbers: &[T], out| {
-            for (i, (number, out)) in numbers.iter().zip(out).enumerate() {
+        let contents = self.store(piece).array(array)?;
+        let count = count.unwrap_or_else(|| contents.count());
+        contents.read(count, &self.progress, &|first, numbers, out| {
+            let mut out = bytemuck::cast_slice_mut::<u8, U>(out).iter_mut();
+            with_kind!(array.kind, T => for (i, number) in bytemuck::cast_slice::<u8, T>(numbers).iter().enumerate() {
                 let index = number.index();
-                *out = index.and_then(&check).ok_or_else(|| explain(first + i, index))?;
-            }
+                let kept = index.and_then(&check).ok_or_else(|| explain(first + i, index))?;
+                if let Some(out) = out.next() {
+                    *out = kept;
+                }
+            });
             Ok(())
-        }))
+        })
+    }
+
+    /// Reads numbers of any type as i64; those that are none are −1.
+    fn signed(&self, piece: &Piece, array: &DataArray, count: u64) -> Result<Vec<i64>> {
+        self.store(piece).array(array)?.read(count, &self.progress, &|_, numbers, out| {
+            let out = bytemuck::cast_slice_mut::<u8, i64>(out);
+            with_kind!(array.kind, T => for (number, out) in bytemuck::cast_slice::<u8, T>(numbers).iter().zip(out) {
+                *out = number.index().and_then(|i| i64::try_from(i).ok()).unwrap_or(-1);
+            });
+            Ok(())
+        })
     }
 
     /// Reads numbers of any type as f64.
-    fn floats(&self, array: &DataArray, tuples: u64) -> Result<Vec<f64>> {
+    fn floats(&self, piece: &Piece, array: &DataArray, tuples: u64) -> Result<Vec<f64>> {
         let count = tuples.saturating_mul(array.components as u64);
-        with_kind!(array.kind, T => self.store.read(array, count, &self.progress, |_, numbers: &[T], out| {
-            numbers.iter().zip(out).for_each(|(number, out)| *out = number.float());
+        self.store(piece).array(array)?.read(count, &self.progress, &|_, numbers, out| {
+            let out = bytemuck::cast_slice_mut::<u8, f64>(out);
+            with_kind!(array.kind, T => for (number, out) in bytemuck::cast_slice::<u8, T>(numbers).iter().zip(out) {
+                *out = number.float();
+            });
             Ok(())
-        }))
+        })
     }
 
     /// The arrays of point or cell data that all pieces have, pieces with no points (or cells) aside.
@@ -420,7 +609,7 @@ impl Grid<'_> {
         for (key, array) in filled.iter().take(1).flat_map(|piece| keyed(piece.arrays(section))) {
             let parts = filled.iter().zip(&found).map(|(piece, arrays)| {
                 let part = arrays.get(&key).filter(|part| part.components == array.components)?;
-                Some((piece.tuples(section), *part))
+                Some((*piece, *part))
             });
             if let Some(parts) = parts.collect::<Option<Vec<_>>>() {
                 lost.remove(&key);
@@ -431,39 +620,69 @@ impl Grid<'_> {
             let names: Vec<&str> = lost.iter().map(|key| key.0).collect();
             tracing::warn!(
                 "{}: {} arrays {names:?} are left out: not every piece has them, with as many components",
-                self.store.path.display(),
+                self.path.display(),
                 section.name()
             );
         }
-        kept.par_iter().map(|parts| self.data_array(parts)).collect()
+        kept.par_iter().map(|parts| self.data_array(section, parts)).collect()
     }
 
-    /// One array of its parts in the pieces, each with the tuples that it has there.
-    fn data_array(&self, parts: &[(u64, &DataArray)]) -> Result<Array> {
+    /// One array of its parts in the pieces.
+    fn data_array(&self, section: Section, parts: &[(&Piece, &DataArray)]) -> Result<Array> {
         let Some((_, first)) = parts.first() else {
-            return Err(Error::malformed(self.store.path, "no piece has arrays"));
+            return Err(Error::malformed(self.path, "no piece has arrays"));
         };
         let values = if parts.iter().all(|(_, part)| part.kind == first.kind) {
             with_kind!(first.kind, T => {
-                let read = |(tuples, part): &(u64, &DataArray)| {
-                    let count = tuples.saturating_mul(part.components as u64);
-                    self.store.read(part, count, &self.progress, |_, numbers: &[T], out| {
+                let read = |(piece, part): &(&Piece, &DataArray)| {
+                    let count = piece.tuples(section).saturating_mul(part.components as u64);
+                    self.store(piece).array(part)?.read(count, &self.progress, &|_, numbers, out| {
                         out.copy_from_slice(numbers);
                         Ok(())
                     })
                 };
-                T::values(joined(parts.par_iter().map(read).collect::<Result<Vec<_>>>()?))
+                T::values(joined(parts.iter().map(read).collect::<Result<Vec<_>>>()?))
             })
         } else {
-            let (path, name) = (self.store.path.display(), &first.name);
+            let (path, name) = (self.path.display(), &first.name);
             tracing::warn!(
                 "{path}: {} array \"{name}\" is read as Float64: its type differs from piece to piece",
                 first.section
             );
-            let floats = parts.par_iter().map(|(tuples, part)| self.floats(part, *tuples));
+            let floats = parts.iter().map(|(piece, part)| self.floats(piece, part, piece.tuples(section)));
             f64::values(joined(floats.collect::<Result<Vec<_>>>()?))
         };
         Ok(Array { name: first.name.clone(), components: first.components, values })
+    }
+}
+
+/// Appends the ends of lists to those before them, which start with 0.
+fn append(all: &mut Vec<u64>, ends: Vec<u64>) {
+    if all.is_empty() {
+        *all = ends;
+        all.insert(0, 0);
+    } else {
+        let base = all.last().copied().unwrap_or_default();
+        all.extend(ends.iter().map(|end| base.saturating_add(*end)));
+    }
+}
+
+fn told(point: Option<u64>) -> String {
+    point.map_or("a negative point".to_owned(), |point| format!("point {point}"))
+}
+
+/// Lagrange hexahedra in files before version 2.1 have the third and fourth of their upright edges the other way round.
+fn renumber(types: &[u8], ends: &[u64], connectivity: &mut [u32]) {
+    let mut start = 0;
+    for (vtk_type, end) in types.iter().zip(ends) {
+        let points = &mut connectivity[start..*end as usize];
+        start = *end as usize;
+        let degree = (2..=10).find(|p: &usize| (p + 1).pow(3) == points.len());
+        if let (72, Some(degree)) = (vtk_type, degree) {
+            let (edge, upright) = (degree - 1, 8 + 8 * (degree - 1));
+            let (third, fourth) = points[upright + 2 * edge..upright + 4 * edge].split_at_mut(edge);
+            third.swap_with_slice(fourth);
+        }
     }
 }
 

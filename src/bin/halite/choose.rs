@@ -85,7 +85,8 @@ pub(crate) fn scalars(mesh: &Mesh, of: Option<Association>) -> Result<Scalars> {
 pub(crate) fn camera(mesh: &Mesh, tetrahedra: &Tetrahedra) -> Camera {
     let (lo, hi) = bounds(mesh, tetrahedra);
     let center = lo.midpoint(hi);
-    let far = |r: f64, p: u32| r.max(mesh.points()[p as usize].distance(center));
+    let points = tetrahedra.points(mesh.points());
+    let far = |r: f64, p: u32| r.max(points[p as usize].distance(center));
     let radius = tetrahedra.corners.as_flattened().iter().fold(0.0, |r, &p| far(r, p));
     let view_angle = 30.0_f64;
     // All cells may be flat at one place, and still need a camera.
@@ -107,8 +108,9 @@ fn direction() -> DVec3 {
 /// The box around all tetrahedra.
 pub(crate) fn bounds(mesh: &Mesh, tetrahedra: &Tetrahedra) -> (DVec3, DVec3) {
     let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let points = tetrahedra.points(mesh.points());
     tetrahedra.corners.as_flattened().iter().fold(empty, |(lo, hi), &p| {
-        let p = mesh.points()[p as usize];
+        let p = points[p as usize];
         (lo.min(p), hi.max(p))
     })
 }
@@ -153,9 +155,12 @@ impl Sample {
     fn new(mesh: &Mesh, tetrahedra: &Tetrahedra, field: &Field) -> Self {
         let step = tetrahedra.corners.len().div_ceil(SAMPLES).max(1);
         let (mut values, mut volume) = (Vec::new(), 0.0);
+        let points = tetrahedra.points(mesh.points());
+        let (at_points, components) = (field.association() == Association::Point, field.kind().components());
+        let scalars = if at_points { tetrahedra.values(field.values(), components) } else { field.values().into() };
         for t in (0..tetrahedra.corners.len()).step_by(step) {
             let corners = tetrahedra.corners[t];
-            let [a, b, c, d] = corners.map(|p| mesh.points()[p as usize]);
+            let [a, b, c, d] = corners.map(|p| points[p as usize]);
             let v = (b - a).cross(c - a).dot(d - a).abs() / 6.0 * step as f64;
             volume += v;
             let at = match field.association() {
@@ -164,7 +169,7 @@ impl Sample {
                 Association::Point => corners[t / step % 4] as usize,
             };
             let normal = field.normal(0);
-            let s = f64::from(field.values()[at]) * normal.half + normal.mid;
+            let s = f64::from(scalars[at * components]) * normal.half + normal.mid;
             if s.is_finite() {
                 values.push((s, v));
             }

@@ -1,9 +1,12 @@
 use crate::{choose, output, progress};
 use anyhow::Result;
 use clap::Args;
+use halite::field::Association;
 use halite::mesh::cells::{self, Tetrahedra};
 use halite::mesh::faces::Faces;
 use halite::mesh::{Array, Mesh, Values};
+use halite::traverse::Geometry;
+use halite::traverse::contacts::Contacts;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -97,24 +100,42 @@ fn describe(out: &mut String, name: &str, mesh: &Mesh) -> Result<()> {
         Err(e) => return Ok(writeln!(out, "  nothing: {e}")?),
     };
     let mut row = |count: usize, what: &str| if count > 0 { writeln!(out, "  {count:>12}  {what}") } else { Ok(()) };
-    let faces = Faces::new(mesh.points(), &tetrahedra.corners);
+    let points = tetrahedra.points(mesh.points());
+    let faces = Faces::new(&points, &tetrahedra.corners);
+    let geometry = Geometry::new(&points, &tetrahedra, &faces);
+    let contacts = Contacts::new(&geometry);
     let skipped = &tetrahedra.skipped;
     row(tetrahedra.cells, "cells")?;
     row(tetrahedra.corners.len(), "tetrahedra")?;
+    row(tetrahedra.added.len(), "points added to split cells")?;
     row(faces.components(), "components")?;
     row(faces.boundary.len(), "boundary faces")?;
     row(skipped.lower_dimensional, "cells left out: no volume")?;
     row(skipped.unsupported.values().sum(), "cells left out: of a type that is not drawn yet")?;
     row(skipped.ghost, "cells left out: ghosts")?;
     row(skipped.invisible, "cells left out: a point is not finite")?;
+    row(skipped.empty, "cells left out: polyhedra without faces")?;
+    let inverted = faces.orientation.iter().filter(|o| **o < 0).count();
+    row(inverted.min(tetrahedra.corners.len() - inverted), "tetrahedra turned inside out against the others")?;
     row(faces.degenerate, "tetrahedra with two corners at one place, left out")?;
     row(faces.flat, "tetrahedra of no volume")?;
+    row(tetrahedra.crooked, "polyhedra that no point inside sees whole: drawn with overlaps")?;
     row(faces.non_manifold, "faces of more than two tetrahedra")?;
     row(faces.folded, "faces with both tetrahedra on one side")?;
-    // Points, scalars, corners and neighbours, as the engine holds them.
-    let bytes = mesh.points().len() * 16 + tetrahedra.corners.len() * 32 + faces.boundary.len() * 40;
-    writeln!(out, "  about {} of memory", size(bytes as f64))?;
-    if let Ok(scalars) = choose::scalars(mesh, None) {
+    let of = if contacts.faces < faces.boundary.len() {
+        format!(", of {} looked at", contacts.faces)
+    } else {
+        String::new()
+    };
+    row(contacts.touching, &format!("boundary faces that lie on other cells without sharing a face{of}"))?;
+    row(contacts.overlapping, &format!("boundary faces inside other cells: cells overlap{of}"))?;
+    let choice = choose::scalars(mesh, None).ok();
+    let tuples = match choice.as_ref().and_then(|scalars| scalars.association) {
+        Some(Association::Cell) => tetrahedra.corners.len(),
+        _ => points.len(),
+    };
+    writeln!(out, "  {} of memory to render one scalar", size((geometry.bytes() + 4 * tuples as u64) as f64))?;
+    if let Some(scalars) = choice {
         writeln!(out, "  \"{}\" if no other array is asked for", scalars.name)?;
     }
     Ok(())
