@@ -132,8 +132,8 @@ impl Tetrahedra {
     /// Splits the cells of `mesh`, on the current rayon pool.
     ///
     /// # Errors
-    /// [`Error::Mesh`] if no 3D cell is left to draw, if a cell has not the number of points that its type demands, or
-    /// if there would be more than [`MAX_TETRAHEDRA`].
+    /// [`Error::Empty`] if no 3D cell is left to draw; [`Error::Mesh`] if a cell has not the number of points that its type
+    /// demands, or if there would be more than [`MAX_TETRAHEDRA`].
     pub fn new(mesh: &Mesh) -> Result<Self> {
         let splitter = Splitter::new(mesh);
         let n = mesh.cells().len();
@@ -143,7 +143,7 @@ impl Tetrahedra {
         let skipped = skipped.into_iter().fold(Skipped::default(), Skipped::merge);
         let total: usize = counts.iter().sum();
         if total == 0 {
-            return Err(Error::Mesh(nothing_left(mesh, &skipped)));
+            return Err(Error::Empty(nothing_left(mesh, &skipped)));
         }
         if total > MAX_TETRAHEDRA {
             let what = format!("its cells make {total} tetrahedra, more than Halite can index ({MAX_TETRAHEDRA})");
