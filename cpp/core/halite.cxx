@@ -2,6 +2,9 @@
 // The face that halite.h shows, made of the bridge. Nothing of the bridge is visible from outside.
 #include "halite.h"
 
+// rust::Error is not in the header of the bridge.
+#include "rust/cxx.h"
+
 #include "halite/src/ffi.rs.h"
 
 #include <mutex>

@@ -24,12 +24,12 @@
 #include "vtkPointData.h"
 #include "vtkRenderer.h"
 #include "vtkTextureObject.h"
-#include "vtkTimerLog.h"
 #include "vtkUnstructuredGridBase.h"
 #include "vtkVolume.h"
 #include "vtkVolumeProperty.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <list>
@@ -125,16 +125,21 @@ void ForwardLog()
   });
 }
 
+double Now()
+{
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
 // Measures its own life, in seconds.
 class Clock
 {
 public:
   explicit Clock(double& seconds)
     : Seconds(seconds)
-    , Start(vtkTimerLog::GetUniversalTime())
+    , Start(Now())
   {
   }
-  ~Clock() { this->Seconds += vtkTimerLog::GetUniversalTime() - this->Start; }
+  ~Clock() { this->Seconds += Now() - this->Start; }
 
 private:
   double& Seconds;
@@ -179,7 +184,7 @@ struct vtkHaliteMapper::Internals
   std::unique_ptr<halite::Renderer> Renderer;
   // What the renderer holds.
   Key SettingsKey, MeshKey, PlacementKey, FieldKey, FunctionKey;
-  std::map<vtkVolumeProperty*, Knots> Knots;
+  std::map<vtkVolumeProperty*, Knots> Functions;
   std::list<Frame> Frames;
   std::list<Presenter> Presenters;
   // What failed, and for what: nothing is tried, or said, twice.
@@ -225,7 +230,7 @@ struct vtkHaliteMapper::Internals
   // Hands to the core what it does not hold yet.
   void Prepare(vtkHaliteMapper& self, const Content& content);
 
-  const struct Knots& KnotsOf(vtkVolumeProperty* property, bool rgba)
+  const Knots& KnotsOf(vtkVolumeProperty* property, bool rgba)
   {
     const bool grey = property->GetColorChannels() == 1;
     vtkPiecewiseFunction* opacity = property->GetScalarOpacity(0);
@@ -235,7 +240,7 @@ struct vtkHaliteMapper::Internals
     sources << static_cast<std::uint64_t>(opacity->GetMTime())
             << static_cast<std::uint64_t>(grey ? greys->GetMTime() : colors->GetMTime())
             << static_cast<std::uint64_t>(rgba);
-    struct Knots& knots = this->Knots[property];
+    Knots& knots = this->Functions[property];
     if (knots.Sources != sources)
     {
       knots.Sources = sources;
@@ -247,8 +252,8 @@ struct vtkHaliteMapper::Internals
       }
       else
       {
-        knots.Color = grey ? Functions::GreyKnotsOf(greys) : Functions::KnotsOf(colors);
-        knots.Opacity = Functions::KnotsOf(opacity);
+        knots.Color = grey ? ::Functions::GreyKnotsOf(greys) : ::Functions::KnotsOf(colors);
+        knots.Opacity = ::Functions::KnotsOf(opacity);
       }
     }
     return knots;
@@ -551,7 +556,7 @@ void vtkHaliteMapper::Render(vtkRenderer* renderer, vtkVolume* volume)
   }
 
   ForwardLog();
-  const double start = vtkTimerLog::GetUniversalTime();
+  const double start = Now();
   Key wanted;
   try
   {
@@ -633,7 +638,7 @@ void vtkHaliteMapper::Render(vtkRenderer* renderer, vtkVolume* volume)
     inner.Failed = wanted;
     say(error.what());
   }
-  this->TimeToDraw = vtkTimerLog::GetUniversalTime() - start;
+  this->TimeToDraw = Now() - start;
 }
 
 VTK_ABI_NAMESPACE_END
