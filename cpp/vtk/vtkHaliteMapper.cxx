@@ -306,8 +306,8 @@ void vtkHaliteMapper::PrintSelf(ostream& os, vtkIndent indent)
 
 void vtkHaliteMapper::ReleaseGraphicsResources(vtkWindow* window)
 {
-  this->Inner->Frames.remove_if(
-    [&](const Frame& f) { return !f.Renderer || !window || f.Renderer->GetVTKWindow() == window; });
+  // Where a renderer comes to a window VTK releases what is of no window: that is nothing of ours.
+  this->Inner->Frames.remove_if([&](const Frame& f) { return !f.Renderer || f.Renderer->GetVTKWindow() == window; });
   this->Inner->Presenters.remove_if([&](const Presenter& p) { return !p.GetWindow() || p.GetWindow() == window; });
   this->Superclass::ReleaseGraphicsResources(window);
 }
@@ -603,7 +603,7 @@ void vtkHaliteMapper::Render(vtkRenderer* renderer, vtkVolume* volume)
     }
     if (!frame.Texture || frame.Pictured != wanted || frame.Depths != depths)
     {
-      frame.Texture = nullptr;
+          frame.Texture = nullptr;
       frame.Pictured = wanted;
       frame.Depths.swap(depths);
       view.depths = frame.Depths.empty() ? nullptr : frame.Depths.data();
