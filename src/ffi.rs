@@ -183,8 +183,12 @@ fn new_mesh(points: Numbers, types: &[u8], offsets: Numbers, connectivity: Numbe
         let index = |what: &str, numbers: Numbers| -> Result<Vec<u64>> {
             let negative = || Error::Mesh(format!("{what} are negative, or no integers"));
             match numbers.kind {
-                Type::I32 => cast::<i32>(&numbers)?.par_iter().map(|&i| u64::try_from(i).map_err(|_| negative())).collect(),
-                Type::I64 => cast::<i64>(&numbers)?.par_iter().map(|&i| u64::try_from(i).map_err(|_| negative())).collect(),
+                Type::I32 => {
+                    cast::<i32>(&numbers)?.par_iter().map(|&i| u64::try_from(i).map_err(|_| negative())).collect()
+                }
+                Type::I64 => {
+                    cast::<i64>(&numbers)?.par_iter().map(|&i| u64::try_from(i).map_err(|_| negative())).collect()
+                }
                 Type::U32 => Ok(cast::<u32>(&numbers)?.iter().map(|&i| u64::from(i)).collect()),
                 Type::U64 => Ok(cast::<u64>(&numbers)?.to_vec()),
                 _ => Err(negative()),
@@ -369,10 +373,8 @@ fn view(spec: &ViewSpec) -> Result<View> {
         camera(&spec.camera, size)?
     };
     let blend = if spec.maximum { Blend::Maximum } else { Blend::Composite };
-    let vectors = |p: &[f64; 6]| ClippingPlane {
-        origin: DVec3::new(p[0], p[1], p[2]),
-        normal: DVec3::new(p[3], p[4], p[5]),
-    };
+    let vectors =
+        |p: &[f64; 6]| ClippingPlane { origin: DVec3::new(p[0], p[1], p[2]), normal: DVec3::new(p[3], p[4], p[5]) };
     let view = view.with_blend(blend).with_clipping_planes(spec.planes.as_chunks().0.iter().map(vectors).collect())?;
     if spec.depths.is_empty() {
         return Ok(view);
@@ -441,7 +443,8 @@ fn cast<'a, T: bytemuck::Pod>(numbers: &Numbers<'a>) -> Result<&'a [T]> {
     if numbers.bytes.is_empty() {
         return Ok(&[]);
     }
-    bytemuck::try_cast_slice(numbers.bytes).map_err(|e| Error::Mesh(format!("numbers that are not where they may be: {e}")))
+    bytemuck::try_cast_slice(numbers.bytes)
+        .map_err(|e| Error::Mesh(format!("numbers that are not where they may be: {e}")))
 }
 
 /// A copy of numbers.

@@ -303,7 +303,9 @@ mod tests {
     fn session() -> Session {
         let mut session = Session::new(2, "cpu", "auto", "exact").unwrap();
         let opacity = vec![(0.0, 0.0), (0.4, 1.0), (0.6, 0.0), (1.0, 0.7)];
-        session.set_transfer(&TransferFunction::new(vec![(0.0, [1.0, 0.5, 0.0]), (1.0, [0.0, 0.5, 1.0])], opacity, 0.3).unwrap());
+        session.set_transfer(
+            &TransferFunction::new(vec![(0.0, [1.0, 0.5, 0.0]), (1.0, [0.0, 0.5, 1.0])], opacity, 0.3).unwrap(),
+        );
         session
     }
 
@@ -325,7 +327,8 @@ mod tests {
     fn a_matrix_draws_what_moved_points_draw() {
         let mut shear = DMat4::from_scale(DVec3::new(2.0, 0.3, 1.5));
         shear.y_axis.x = 0.8;
-        let mirror = DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0)) * DMat4::from_translation(DVec3::new(-1.0, 0.2, 0.0));
+        let mirror =
+            DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0)) * DMat4::from_translation(DVec3::new(-1.0, 0.2, 0.0));
         let far = DMat4::from_scale(DVec3::splat(3.0)) * DMat4::from_rotation_z(2.0);
         let tets = mesh();
         let split = Tetrahedra::new(&tets).unwrap();
@@ -396,7 +399,13 @@ mod tests {
     #[test]
     fn a_mesh_with_nothing_to_draw_gives_empty_pictures() {
         let mut session = session();
-        session.set_mesh(&Mesh::new(vec![], crate::mesh::Cells { offsets: vec![0], ..Default::default() }, vec![], vec![]).unwrap(), DMat4::IDENTITY).unwrap();
+        session
+            .set_mesh(
+                &Mesh::new(vec![], crate::mesh::Cells { offsets: vec![0], ..Default::default() }, vec![], vec![])
+                    .unwrap(),
+                DMat4::IDENTITY,
+            )
+            .unwrap();
         session.set_field(|| Err(Error::Render("not asked".into()))).unwrap();
         assert!(draw(&mut session).pixels.iter().all(|p| *p == [0.0; 4]));
     }

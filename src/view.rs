@@ -420,9 +420,7 @@ impl View {
         if let Some(depth) = &self.depth {
             let d = depth.values[j as usize * self.size[0] as usize + i as usize];
             let t = match (depth.kind, self.clipping_range) {
-                (DepthKind::Window, Some([near, far])) if self.lens.meet => {
-                    near * far / (far - d * (far - near)) / cos
-                }
+                (DepthKind::Window, Some([near, far])) if self.lens.meet => near * far / (far - d * (far - near)) / cos,
                 (DepthKind::Window, Some([near, far])) => (near + d * (far - near)) / cos,
                 (DepthKind::Ray, _) => d,
                 _ => d / cos,
@@ -453,7 +451,8 @@ mod tests {
     const SIZE: [u32; 2] = [64, 48];
 
     fn camera(projection: Projection) -> View {
-        let [position, focal_point, view_up] = [[1.0, -2.0, 3.5], [0.3, 0.1, -0.4], [0.1, 1.0, 0.2]].map(DVec3::from_array);
+        let [position, focal_point, view_up] =
+            [[1.0, -2.0, 3.5], [0.3, 0.1, -0.4], [0.1, 1.0, 0.2]].map(DVec3::from_array);
         let camera = Camera { position, focal_point, view_up, projection };
         View::new(camera, SIZE).unwrap().with_clipping_range([0.5, 90.0]).unwrap()
     }

@@ -185,7 +185,7 @@ def interpolate(knots, s):
 
 
 def truth(r, size, low=(0, 0, 0), high=(1, 1, 1), field=lambda p: p[..., 2], opacity=((0, 1),), color=WHITE, unit=1.0,
-          matrix=np.eye(4), keep=lambda p: True, maximum=False, steps=800, slab=False):
+          matrix=np.eye(4), keep=lambda p: True, maximum=False, steps=300, slab=False):
     """The picture of a box under `matrix`, in bytes, of what `keep` says of points in the world."""
     start, end = rays(r, size)
     inverse = np.linalg.inv(matrix)

@@ -76,7 +76,7 @@ def test_scalar_modes():
     check(pixels(w), upward, what="point data")
     # Bricks count along x, then y, then z.
     number = lambda p: sum((p[..., k] > 0.5) * 2**k for k in range(3)) / 7.0
-    celled = truth(r, (64, 64), field=number, opacity=WAVES, color=RAMP, steps=4000)
+    celled = truth(r, (64, 64), field=number, opacity=WAVES, color=RAMP, steps=2000)
     m.SetScalarModeToUseCellData()
     g.GetCellData().SetActiveScalars("cells")
     check(pixels(w), celled, what="cell data")
