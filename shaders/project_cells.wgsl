@@ -157,7 +157,7 @@ fn dependency(p: array<vec3f, 4>) -> vec4f {
     let c = p[2] - p[0];
     let d = p[3] - p[0];
     let normals = array<vec3f, 3>(cross(c, d), cross(d, b), cross(b, c));
-    let from_eye = select(frame.forward.xyz, p[0] + frame.forward.xyz * frame.forward.w, frame.perspective == 1u);
+    let from_eye = select(frame.direction[0].xyz, p[0] + frame.direction[0].xyz * frame.forward.w, frame.perspective == 1u);
     let rest = -vec3f(dot(from_eye, normals[0]), dot(from_eye, normals[1]), dot(from_eye, normals[2]));
     let volume = select(0.0, dot(b, normals[0]), frame.perspective == 1u);
     return vec4f(volume - rest.x - rest.y - rest.z, rest);

@@ -33,6 +33,9 @@ pub enum Error {
     /// A mesh breaks a rule that every mesh must keep.
     #[error("the mesh is not valid: {0}")]
     Mesh(String),
+    /// A mesh has no cell to draw.
+    #[error("the mesh cannot be drawn: {0}")]
+    Empty(String),
     /// The chosen array does not exist, or cannot be drawn.
     #[error("{0}")]
     Field(String),
@@ -60,6 +63,9 @@ pub enum Error {
     /// A device is gone: unplugged, reset, or its driver failed.
     #[error("{0}")]
     Lost(String),
+    /// Whoever was told the progress wanted no more of it.
+    #[error("the frame was given up, as asked")]
+    Aborted,
     /// The renderer was asked for a frame before it had what it needs, or after it failed.
     #[error("{0}")]
     Render(String),

@@ -1,7 +1,7 @@
 //! The field that is drawn: one array of a mesh, reduced to a scalar, a (colour, opacity) pair or RGBA.
 
 use crate::error::{Error, Result};
-use crate::mesh::{Array, Mesh, Values, with_values};
+use crate::mesh::{Array, Mesh, with_values};
 use rayon::prelude::*;
 
 /// Whether values belong to points (and vary linearly inside a tetrahedron) or to cells (and are constant inside).
@@ -119,7 +119,23 @@ impl Field {
     /// # Errors
     /// [`Error::Field`] if the array has no such component, or holds no finite value.
     pub fn from_array(array: &Array, association: Association, component: Component) -> Result<Self> {
-        let (n, name) = (array.components, &array.name);
+        with_values!(&array.values, v => Self::from_slice(&array.name, v, array.components, association, component))
+    }
+
+    /// Takes `component` of an array called `name`, whose tuples of `n` numbers lie one after another in `numbers`.
+    ///
+    /// # Errors
+    /// [`Error::Field`] if the array is not made of such tuples, has no such component, or holds no finite value.
+    pub fn from_slice<T: Number>(
+        name: &str,
+        numbers: &[T],
+        n: usize,
+        association: Association,
+        component: Component,
+    ) -> Result<Self> {
+        if n == 0 || !numbers.len().is_multiple_of(n) {
+            return Err(Error::Field(format!("array \"{name}\" has {} values, in tuples of {n}", numbers.len())));
+        }
         let kind = match component {
             Component::Index(i) if i >= n => {
                 return Err(Error::Field(format!("array \"{name}\" has {n} components, so there is no component {i}")));
@@ -136,16 +152,17 @@ impl Field {
             },
             _ => Kind::Scalar,
         };
+        let tuples = numbers.len() / n;
         let value = |tuple: usize, k: usize| match component {
-            Component::Index(i) => array.values.get(tuple * n + i),
-            Component::Magnitude if n == 1 => array.values.get(tuple).abs(),
-            Component::Magnitude => magnitude(&array.values, tuple * n, n),
-            Component::All => array.values.get(tuple * n + k),
+            Component::Index(i) => numbers[tuple * n + i].to_f64(),
+            Component::Magnitude if n == 1 => numbers[tuple].to_f64().abs(),
+            Component::Magnitude => magnitude(&numbers[tuple * n..(tuple + 1) * n]),
+            Component::All => numbers[tuple * n + k].to_f64(),
         };
         let m = kind.components();
         let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; 4];
         for (k, r) in range.iter_mut().enumerate().take(m) {
-            *r = (0..array.tuples())
+            *r = (0..tuples)
                 .into_par_iter()
                 .map(|t| value(t, k))
                 .filter(|v| v.is_finite())
@@ -158,10 +175,9 @@ impl Field {
         let mut normal = range.map(|r| Normal::new(r[0], r[1]));
         if kind == Kind::Rgba {
             // The colour needs no function, only its own scale: bytes are 255ths, anything else is taken as it is.
-            let one = if matches!(array.values, Values::U8(_)) { 255.0 } else { 1.0 };
-            normal[..3].fill(Normal { mid: 0.0, half: one });
+            normal[..3].fill(Normal { mid: 0.0, half: T::FULL });
         }
-        let mut values = vec![0.0; array.tuples() * m];
+        let mut values = vec![0.0; tuples * m];
         values.par_chunks_mut(m).enumerate().for_each(|(t, out)| {
             for (k, v) in out.iter_mut().enumerate() {
                 *v = normal[k].apply(value(t, k)) as f32;
@@ -196,8 +212,28 @@ impl Field {
     }
 }
 
-/// The length of the tuple at `start`, without overflow for components up to 1e300.
-#[allow(clippy::unnecessary_cast, reason = "one of the ten types is f64 already")]
-fn magnitude(values: &Values, start: usize, n: usize) -> f64 {
-    with_values!(values, v => v[start..start + n].iter().fold(0.0, |m: f64, &x| m.hypot(x as f64)))
+/// A type of number that arrays are made of.
+pub trait Number: Copy + Send + Sync {
+    /// What a colour component at its full is in this type.
+    const FULL: f64;
+    /// The number as f64, rounded if it must be.
+    fn to_f64(self) -> f64;
+}
+
+macro_rules! numbers {
+    ($($t:ty, $full:expr;)*) => {
+        $(impl Number for $t {
+            const FULL: f64 = $full;
+            #[allow(clippy::cast_lossless, clippy::unnecessary_cast, reason = "one cast for ten types")]
+            fn to_f64(self) -> f64 {
+                self as f64
+            }
+        })*
+    };
+}
+numbers! { i8, 1.0; u8, 255.0; i16, 1.0; u16, 1.0; i32, 1.0; u32, 1.0; i64, 1.0; u64, 1.0; f32, 1.0; f64, 1.0; }
+
+/// The length of a tuple, without overflow for components up to 1e300.
+fn magnitude<T: Number>(tuple: &[T]) -> f64 {
+    tuple.iter().fold(0.0, |m: f64, x| m.hypot(x.to_f64()))
 }

@@ -10,13 +10,17 @@
 //! 5. [`traverse`] walks each pixel's ray of a [`view::View`] from cell to cell and adds those up.
 //! 6. [`image::Image`] holds the result: linear premultiplied RGBA, 32-bit float.
 //!
-//! [`render::Renderer`] is the whole flow behind one door. [`scene`] describes a picture in a JSON file, and
+//! [`render::Renderer`] is the whole flow behind one door, [`host::Session`] that door inside another program; with the feature
+//! `ffi` it opens to C++. [`scene`] describes a picture in a JSON file, and
 //! [`mod@reference`] is the slow float64 second opinion that the tests judge the engines by.
 
 pub mod cell;
 pub mod error;
+#[cfg(feature = "ffi")]
+pub mod ffi;
 pub mod field;
 pub mod gpu;
+pub mod host;
 pub mod image;
 pub mod integral;
 pub mod io;

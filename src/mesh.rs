@@ -179,18 +179,8 @@ impl Mesh {
             let (p, count) = (cells.connectivity[i], points.len());
             return fail(format!("cell {c} names point {p}, but there are {count} points"));
         }
-        for (kind, arrays, count) in [("point", &point_arrays, points.len()), ("cell", &cell_arrays, n)] {
-            for a in arrays {
-                if a.components == 0 || count.checked_mul(a.components) != Some(a.values.len()) {
-                    return fail(format!(
-                        "{kind} array \"{}\" has {} values, not {} components for each of {count} {kind}s",
-                        a.name,
-                        a.values.len(),
-                        a.components
-                    ));
-                }
-            }
-        }
+        point_arrays.iter().try_for_each(|a| check_array("point", a, points.len()))?;
+        cell_arrays.iter().try_for_each(|a| check_array("cell", a, n))?;
         Ok(Mesh { points, cells, polyhedra: None, point_arrays, cell_arrays })
     }
 
@@ -217,6 +207,26 @@ impl Mesh {
         Ok(Mesh { polyhedra: Some(polyhedra), ..self })
     }
 
+    /// Adds an array with a value for each point.
+    ///
+    /// # Errors
+    /// [`Error::Mesh`] if its length is not components × points.
+    pub fn add_point_array(&mut self, array: Array) -> Result<()> {
+        check_array("point", &array, self.points.len())?;
+        self.point_arrays.push(array);
+        Ok(())
+    }
+
+    /// Adds an array with a value for each cell.
+    ///
+    /// # Errors
+    /// [`Error::Mesh`] if its length is not components × cells.
+    pub fn add_cell_array(&mut self, array: Array) -> Result<()> {
+        check_array("cell", &array, self.cells.len())?;
+        self.cell_arrays.push(array);
+        Ok(())
+    }
+
     /// The points, in world coordinates.
     pub fn points(&self) -> &[DVec3] {
         &self.points
@@ -241,4 +251,16 @@ impl Mesh {
     pub fn cell_arrays(&self) -> &[Array] {
         &self.cell_arrays
     }
+}
+
+fn check_array(kind: &str, a: &Array, count: usize) -> Result<()> {
+    if a.components > 0 && count.checked_mul(a.components) == Some(a.values.len()) {
+        return Ok(());
+    }
+    Err(Error::Mesh(format!(
+        "{kind} array \"{}\" has {} values, not {} components for each of {count} {kind}s",
+        a.name,
+        a.values.len(),
+        a.components
+    )))
 }

@@ -15,6 +15,8 @@ use crate::traverse::{Geometry, Values, cpu};
 use crate::view::{Blend, View};
 use glam::DVec3;
 use rayon::prelude::*;
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::Instant;
 
 /// How frames are drawn.
@@ -44,6 +46,27 @@ pub struct Renderer {
     transfer: Option<TransferFunction>,
     exact: Option<Exact<f32>>,
     stats: Stats,
+}
+
+/// What a caller is told of, and answers to.
+type Progress<'a> = dyn Fn(f64) -> ControlFlow<()> + Sync + 'a;
+
+/// What may come back from whoever is told the progress.
+pub trait Answer {
+    /// Whether no more is wanted.
+    fn stops(self) -> bool;
+}
+
+impl Answer for () {
+    fn stops(self) -> bool {
+        false
+    }
+}
+
+impl Answer for ControlFlow<()> {
+    fn stops(self) -> bool {
+        self.is_break()
+    }
 }
 
 /// The mesh that is drawn.
@@ -216,11 +239,16 @@ impl Renderer {
 
     /// Draws another mesh from now on, split into `tetrahedra`; the field must be set again.
     pub fn set_mesh(&mut self, mesh: &Mesh, tetrahedra: Tetrahedra) {
+        self.load(mesh.points(), mesh.cells().len(), tetrahedra);
+    }
+
+    /// As [`Self::set_mesh`], of a mesh of so many `cells` and these points.
+    pub(crate) fn load(&mut self, points: &[DVec3], cells: usize, tetrahedra: Tetrahedra) {
         let start = Instant::now();
         // Projected cells need no neighbours.
         let connected = self.project.is_none();
         let geometry = self.pool.install(|| {
-            let points = tetrahedra.points(mesh.points());
+            let points = tetrahedra.points(points);
             if !connected {
                 return Geometry::unconnected(&points, &tetrahedra);
             }
@@ -228,12 +256,12 @@ impl Renderer {
             Geometry::new(&points, &tetrahedra, &faces)
         });
         self.stats.faces_ms = ms(start);
-        self.stats.cells = mesh.cells().len() as u64;
+        self.stats.cells = cells as u64;
         self.stats.tetrahedra = tetrahedra.corners.len() as u64;
         self.stats.device_bytes = geometry.bytes();
         self.field = None;
         self.forget(Part::Mesh);
-        self.mesh = Some(Loaded { tetrahedra, geometry, points: mesh.points().len(), cells: mesh.cells().len() });
+        self.mesh = Some(Loaded { tetrahedra, geometry, points: points.len(), cells });
     }
 
     /// Moves the points of the mesh; cells, fields and values stay. Cells keep their neighbours, so none may turn inside out,
@@ -246,12 +274,18 @@ impl Renderer {
         if points.len() != mesh.points || !points.iter().all(|p| p.is_finite()) {
             return Err(Error::Mesh(format!("{} points, all finite, must take the place of as many", mesh.points)));
         }
+        let scale = mesh.geometry.scale;
         self.pool.install(|| mesh.geometry.set_points(&mesh.tetrahedra.points(points)));
+        let scaled = mesh.geometry.scale != scale;
         if let Some(traverse) = &mut self.device {
             traverse.forget(Part::Points);
         }
         if let Some(project) = &mut self.project {
             project.forget(Part::Points);
+        }
+        // Extinction counts per normalised length.
+        if scaled {
+            self.forget(Part::Function);
         }
         Ok(())
     }
@@ -286,14 +320,27 @@ impl Renderer {
         self.forget(Part::Function);
     }
 
-    /// Draws a frame. `progress` is told the share that is done, in [0, 1], and may be called from several threads.
+    /// Draws a frame. `progress` is told the share that is done, in [0, 1], and may be called from several threads. It may
+    /// answer [`ControlFlow::Break`]: the frame is then given up, on the CPU soon.
     ///
     /// A device that is lost is opened again, once a frame; where that fails, the CPU draws from then on.
     ///
     /// # Errors
     /// [`Error::Render`] if mesh, field or transfer function were never set; [`Error::Memory`] if they do not fit the device,
-    /// and [`Error::Device`] if it refuses them, unless it was not named.
-    pub fn render(&mut self, view: &View, progress: &(dyn Fn(f64) + Sync)) -> Result<Image> {
+    /// and [`Error::Device`] if it refuses them, unless it was not named; [`Error::Aborted`] if `progress` wanted no more.
+    pub fn render<A: Answer>(&mut self, view: &View, progress: &(dyn Fn(f64) -> A + Sync)) -> Result<Image> {
+        let stopped = AtomicBool::new(false);
+        let tell = |share: f64| {
+            if progress(share).stops() {
+                stopped.store(true, Relaxed);
+            }
+            if stopped.load(Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        let image = self.render_anyhow(view, &tell)?;
+        if stopped.load(Relaxed) { Err(Error::Aborted) } else { Ok(image) }
+    }
+
+    fn render_anyhow(&mut self, view: &View, progress: &Progress) -> Result<Image> {
         match self.try_render(view, progress) {
             Err(Error::Lost(why)) if self.project.is_some() => {
                 tracing::warn!("{why}; opening it again");
@@ -327,7 +374,7 @@ impl Renderer {
         self.name_device();
     }
 
-    fn try_render(&mut self, view: &View, progress: &(dyn Fn(f64) + Sync)) -> Result<Image> {
+    fn try_render(&mut self, view: &View, progress: &Progress) -> Result<Image> {
         let start = Instant::now();
         let missing = |what: &str| Error::Render(format!("there is no {what} to draw"));
         let mesh = self.mesh.as_ref().ok_or_else(|| missing("mesh"))?;
@@ -348,7 +395,7 @@ impl Renderer {
                 AnyValues::Pair(v) => project.render(geometry, v, exact, &precise, view, switches),
                 AnyValues::Rgba(v) => project.render(geometry, v, exact, &precise, view, switches),
             })?;
-            progress(1.0);
+            let _ = progress(1.0);
             self.stats.uploaded_bytes = project.gpu().uploaded() - uploaded;
             self.stats.device_bytes = project.gpu().allocated();
             let project::Counts { records, order_ms, project_ms, draw_ms, fragments } = counts;
@@ -397,7 +444,7 @@ struct Frame<'a> {
     transfer: &'a TransferFunction,
     exact: &'a Exact<f32>,
     view: &'a View,
-    progress: &'a (dyn Fn(f64) + Sync),
+    progress: &'a Progress<'a>,
 }
 
 impl Frame<'_> {
@@ -423,7 +470,7 @@ impl Frame<'_> {
         let by_cpu = cpu::render_pixels(geometry, values, self.exact, &pixel, self.view, &unfinished);
         unfinished.iter().zip(by_cpu).for_each(|(&i, p)| drawn.pixels[i] = p);
         drawn.counts.unfinished = unfinished.len() as u64;
-        (self.progress)(1.0);
+        let _ = (self.progress)(1.0);
         let mut image = Image::new(self.view.size());
         image.pixels = drawn.pixels;
         Ok((image, drawn.counts, drawn.device_ms))

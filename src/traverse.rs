@@ -55,9 +55,7 @@ impl Geometry {
     pub fn new(points: &[DVec3], tetrahedra: &Tetrahedra, faces: &Faces) -> Self {
         let corners = &tetrahedra.corners;
         let [low, high] = bounds(points, corners);
-        let (centre, radius) = (low / 2.0 + high / 2.0, (high / 2.0 - low / 2.0).max_element());
-        // A power of two scales without rounding; f64 has none for radii below 1e-307, which no mesh has.
-        let scale = if radius > 0.0 { (-radius.log2().ceil()).clamp(-1000.0, 1000.0).exp2() } else { 1.0 };
+        let (centre, scale) = normalisation(low, high);
         let normalised = |p: u32| (points[p as usize] - centre) * scale;
 
         let weld = |p: u32| faces.weld.as_ref().map_or(p, |w| w[p as usize]);
@@ -103,6 +101,15 @@ impl Geometry {
     /// Moves the points: `points` are as many as before, in world coordinates. Cells keep their neighbours, so none may turn inside
     /// out, and points that shared a position still must.
     pub fn set_points(&mut self, points: &[DVec3]) {
+        let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+        let [low, high] = self
+            .point_of
+            .par_iter()
+            .fold(|| none, |[l, h], &p| [l.min(points[p as usize]), h.max(points[p as usize])])
+            .reduce(|| none, |a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+        if low.x <= high.x {
+            (self.centre, self.scale) = normalisation(low, high);
+        }
         let (centre, scale) = (self.centre, self.scale);
         self.points = self.point_of.par_iter().map(|&p| (points[p as usize] - centre) * scale).collect();
         self.boundary.refit(&self.points);
@@ -175,6 +182,14 @@ impl<const N: usize> Values<N> {
             Values::Corner(v) => size_of_val(&**v) as u64,
         }
     }
+}
+
+/// Centre and scale that bring what lies between two corners into [−1, 1]³.
+fn normalisation(low: DVec3, high: DVec3) -> (DVec3, f64) {
+    let (centre, radius) = (low / 2.0 + high / 2.0, (high / 2.0 - low / 2.0).max_element());
+    // A power of two scales without rounding; f64 has none for radii below 1e-307, which no mesh has.
+    let scale = if radius > 0.0 { (-radius.log2().ceil()).clamp(-1000.0, 1000.0).exp2() } else { 1.0 };
+    (centre, scale)
 }
 
 /// Smallest and largest coordinates of the points that `corners` name; zero if there are none.

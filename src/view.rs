@@ -1,7 +1,7 @@
 //! The view: camera, image size, and what limits each ray: clipping range, clipping planes, a depth buffer.
 
 use crate::error::{Error, Result};
-use glam::{DVec2, DVec3};
+use glam::{DMat3, DMat4, DVec2, DVec3};
 
 /// How the camera maps the world to the image plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -89,7 +89,7 @@ pub struct Ray {
 pub struct Fan {
     /// Where rays start: for the middle of the image, and per x and y.
     pub origin: [DVec3; 3],
-    /// Where they run; the first is the view direction, of unit length.
+    /// Where they run: any of them advances by 1 along the view direction.
     pub direction: [DVec3; 3],
     /// From the camera to where the rays start, along the view direction.
     pub ahead: f64,
@@ -110,18 +110,92 @@ impl Fan {
     }
 }
 
+/// All rays of a camera, in world coordinates: at (x, y), each in [−1, 1] across the image and y up, a ray starts at
+/// origin · (1, x, y) and runs along direction · (1, x, y), which advances by 1 along `forward`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Lens {
+    origin: [DVec3; 3],
+    direction: [DVec3; 3],
+    /// The view direction, along which depths count from `origin`; a unit vector.
+    forward: DVec3,
+    /// Whether rays meet in `origin[0]`; they are parallel else.
+    meet: bool,
+    /// From `p − origin[0]` to (x, y, 1) times the depth, or (x, y, depth) if rays are parallel.
+    inverse: DMat3,
+}
+
 /// What to draw: the camera, the size of the image and everything that limits the rays.
 #[derive(Debug, Clone, PartialEq)]
 pub struct View {
-    camera: Camera,
+    camera: Option<Camera>,
+    lens: Lens,
     size: [u32; 2],
     pixel_offset: DVec2,
     clipping_range: Option<[f64; 2]>,
     clipping_planes: Vec<ClippingPlane>,
     depth: Option<DepthBuffer>,
     blend: Blend,
-    /// Right, up and forward unit vectors.
-    axes: [DVec3; 3],
+}
+
+impl Lens {
+    fn new(origin: [DVec3; 3], direction: [DVec3; 3], forward: DVec3, meet: bool) -> Option<Self> {
+        let [x, y] = if meet { [direction[1], direction[2]] } else { [origin[1], origin[2]] };
+        let across = DMat3::from_cols(x, y, direction[0]);
+        let inverse = across.inverse();
+        let usable = across.determinant() != 0.0 && inverse.is_finite() && origin[0].is_finite();
+        usable.then_some(Lens { origin, direction, forward, meet, inverse })
+    }
+
+    /// The rays of a camera whose images are `aspect` times as wide as high.
+    fn of_camera(camera: &Camera, [right, up, forward]: [DVec3; 3], aspect: f64) -> Option<Self> {
+        let zero = DVec3::ZERO;
+        let (origin, direction) = match camera.projection {
+            Projection::Perspective { view_angle } => {
+                let tan = (view_angle.to_radians() / 2.0).tan();
+                ([camera.position, zero, zero], [forward, right * (tan * aspect), up * tan])
+            }
+            Projection::Parallel { parallel_scale: s } => {
+                ([camera.position, right * (s * aspect), up * s], [forward, zero, zero])
+            }
+        };
+        Self::new(origin, direction, forward, matches!(camera.projection, Projection::Perspective { .. }))
+    }
+
+    /// The rays of OpenGL's matrices, and the depths of their near and far planes; none if the matrices are singular, or the
+    /// planes not parallel to each other and to the image.
+    ///
+    /// Rays follow from the rows of x, y and w alone, so that a far plane very far away costs no digits.
+    fn of_matrices(view: DMat4, projection: DMat4) -> Option<(Self, [f64; 2])> {
+        if view.row(3).to_array() != [0.0, 0.0, 0.0, 1.0] {
+            return None;
+        }
+        let [x, y, z, w] = [0, 1, 2, 3].map(|k| projection.row(k));
+        let meet = w.truncate() != DVec3::ZERO;
+        let [x, y, z] = if meet { [x, y, z] } else { [x, y, z].map(|row| row / w.w) };
+        // What depth is measured by: w, or z where that is constant.
+        let along = if meet { w } else { z.truncate().try_normalize()?.extend(0.0) };
+        let rows = DMat3::from_cols(x.truncate(), y.truncate(), along.truncate()).transpose();
+        let [right, up, ahead] = rows.inverse().to_cols_array_2d().map(DVec3::from_array);
+        let start = -(right * x.w + up * y.w + ahead * along.w);
+        let (across, step) = if meet { ([right, up], ahead) } else { ([DVec3::ZERO; 2], ahead) };
+        // z along a ray at depth t is a + b t, before it is divided by w = t where rays meet.
+        let (a, b) = (z.truncate().dot(start) + z.w, z.truncate().dot(step));
+        if across.iter().any(|d| z.truncate().dot(*d).abs() > 1e-9 * b.abs()) {
+            return None;
+        }
+        let range = if meet { [-a / (1.0 + b), a / (1.0 - b)] } else { [(-1.0 - a) / b, (1.0 - a) / b] };
+        // To the world, where lengths may be others.
+        let to_world = view.inverse();
+        let gradient = view.transpose().transform_vector3(along.truncate());
+        let stretch = gradient.length();
+        let [d0, d1, d2] = [step, across[0], across[1]].map(|d| to_world.transform_vector3(d) * stretch);
+        let [o1, o2] = if meet { [DVec3::ZERO; 2] } else { [right, up].map(|d| to_world.transform_vector3(d)) };
+        let origin = [to_world.transform_point3(start), o1, o2];
+        let lens = Self::new(origin, [d0, d1, d2], gradient / stretch, meet)?;
+        // An infinite far plane is what 1 − b = 0 means; rounding may make it negative.
+        let far = if meet && range[1] < 0.0 { f64::INFINITY } else { range[1] };
+        Some((lens, [range[0] / stretch, far / stretch]))
+    }
 }
 
 impl View {
@@ -132,9 +206,7 @@ impl View {
     /// (position equals focal point, or view up lies along the view), or the angle or scale is out of range.
     pub fn new(camera: Camera, size: [u32; 2]) -> Result<Self> {
         let fail = |what: String| Err(Error::View(what));
-        if size[0] == 0 || size[1] == 0 || u64::from(size[0]) * u64::from(size[1]) > 1 << 28 {
-            return fail(format!("an image of {}x{} pixels", size[0], size[1]));
-        }
+        check_size(size)?;
         for (what, v) in
             [("position", camera.position), ("focal point", camera.focal_point), ("view up", camera.view_up)]
         {
@@ -158,16 +230,42 @@ impl View {
             return fail("the view up vector is zero or lies along the view".into());
         };
         let axes = [right, right.cross(forward), forward];
-        Ok(View {
+        let Some(lens) = Lens::of_camera(&camera, axes, f64::from(size[0]) / f64::from(size[1])) else {
+            return fail("the camera's numbers are too large or too small".into());
+        };
+        Ok(Self::through(lens, Some(camera), size))
+    }
+
+    /// A view of `size` (width, height) pixels as OpenGL's matrices have it: `view` from the world to the eye (affine),
+    /// `projection` from there to clip coordinates. So cameras off the axis, of one eye of two, sheared or of one tile of an
+    /// image can be had. Near and far plane become the clipping range.
+    ///
+    /// # Errors
+    /// [`Error::View`] if the size is 0 or above 2²⁸ pixels, a matrix is singular or not finite, `view` is not affine, or the
+    /// near and far planes do not ascend or are not parallel to the image.
+    pub fn from_matrices(view: DMat4, projection: DMat4, size: [u32; 2]) -> Result<Self> {
+        check_size(size)?;
+        let fail = |what: &str| Err(Error::View(what.into()));
+        if !(view.is_finite() && projection.is_finite()) {
+            return fail("the camera's matrices are not finite");
+        }
+        match Lens::of_matrices(view, projection) {
+            Some((lens, range)) => Self::through(lens, None, size).with_clipping_range(range),
+            None => fail("the camera's matrices are singular, or their near and far planes not parallel to the image"),
+        }
+    }
+
+    fn through(lens: Lens, camera: Option<Camera>, size: [u32; 2]) -> Self {
+        View {
             camera,
+            lens,
             size,
             pixel_offset: DVec2::ZERO,
             clipping_range: None,
             clipping_planes: Vec::new(),
             depth: None,
             blend: Blend::default(),
-            axes,
-        })
+        }
     }
 
     /// Samples each pixel at this offset from its centre, in pixels (right, up).
@@ -181,8 +279,7 @@ impl View {
     /// # Errors
     /// [`Error::View`] if they do not ascend, or the near one is not above 0 in a perspective view.
     pub fn with_clipping_range(mut self, [near, far]: [f64; 2]) -> Result<Self> {
-        let perspective = matches!(self.camera.projection, Projection::Perspective { .. });
-        if near.is_nan() || far.is_nan() || near >= far || (perspective && near <= 0.0) {
+        if near.is_nan() || far.is_nan() || near >= far || (self.lens.meet && near <= 0.0) {
             return Err(Error::View(format!("the clipping range is {near} to {far}")));
         }
         self.clipping_range = Some([near, far]);
@@ -228,9 +325,19 @@ impl View {
         self.size
     }
 
-    /// The camera.
-    pub fn camera(&self) -> &Camera {
-        &self.camera
+    /// The camera; none if matrices say where rays run.
+    pub fn camera(&self) -> Option<&Camera> {
+        self.camera.as_ref()
+    }
+
+    /// The point that all rays come from; none if they are parallel.
+    pub fn eye(&self) -> Option<DVec3> {
+        self.lens.meet.then_some(self.lens.origin[0])
+    }
+
+    /// The view direction, along which depths count; a unit vector.
+    pub fn forward(&self) -> DVec3 {
+        self.lens.forward
     }
 
     /// The blending.
@@ -257,68 +364,53 @@ impl View {
     /// perspective camera.
     pub fn pixel(&self, p: DVec3) -> Option<DVec2> {
         let [w, h] = self.size.map(f64::from);
-        let from_camera = p - self.camera.position;
-        let [x, y, depth] = self.axes.map(|a| from_camera.dot(a));
-        let half_height = match self.camera.projection {
-            Projection::Perspective { .. } if depth <= 1e-6 * from_camera.length() => return None,
-            Projection::Perspective { view_angle } => depth * (view_angle.to_radians() / 2.0).tan(),
-            Projection::Parallel { parallel_scale } => parallel_scale,
+        let from_camera = p - self.lens.origin[0];
+        let at = self.lens.inverse * from_camera;
+        let depth = match self.lens.meet {
+            true if at.z <= 1e-6 * from_camera.length() => return None,
+            true => at.z,
+            false => 1.0,
         };
-        Some(DVec2::new(0.5 * (w + h * x / half_height), 0.5 * h * (1.0 - y / half_height)))
+        Some(DVec2::new(0.5 * w * (1.0 + at.x / depth), 0.5 * h * (1.0 - at.y / depth)))
     }
 
     /// The ray through pixel coordinates `x` (from the left) and `y` (from the top), in pixels; the centre of the first
     /// pixel is at 0.5. Nothing but the camera limits it.
     pub fn ray_through(&self, x: f64, y: f64) -> Ray {
         let [w, h] = self.size.map(f64::from);
-        let [right, up, forward] = self.axes;
-        let ndc = DVec2::new(2.0 * x / w - 1.0, 1.0 - 2.0 * y / h);
-        match self.camera.projection {
-            Projection::Perspective { view_angle } => {
-                let tan = (view_angle.to_radians() / 2.0).tan();
-                let direction = forward + right * (ndc.x * tan * w / h) + up * (ndc.y * tan);
-                let direction = direction.normalize();
-                Ray { origin: self.camera.position, direction, t_min: 0.0, t_max: f64::INFINITY }
-            }
-            Projection::Parallel { parallel_scale: s } => {
-                let origin = self.camera.position + right * (ndc.x * s * w / h) + up * (ndc.y * s);
-                Ray { origin, direction: forward, t_min: f64::NEG_INFINITY, t_max: f64::INFINITY }
-            }
-        }
+        let (x, y) = (2.0 * x / w - 1.0, 1.0 - 2.0 * y / h);
+        let at = |[middle, right, up]: [DVec3; 3]| middle + right * x + up * y;
+        let (origin, direction) = (at(self.lens.origin), at(self.lens.direction).normalize());
+        let t_min = if self.lens.meet { 0.0 } else { f64::NEG_INFINITY };
+        Ray { origin, direction, t_min, t_max: f64::INFINITY }
     }
 
     /// The view's rays as one affine form, in coordinates (world − `centre`) · `scale`. They start near the centre, so that f32
     /// can tell their places; but at the eye of a perspective view if that is not beyond `near_eye` from it.
     pub fn fan(&self, centre: DVec3, scale: f64, near_eye: f64) -> Fan {
         let [w, h] = self.size.map(f64::from);
-        let [right, up, forward] = self.axes;
-        let eye = (self.camera.position - centre) * scale;
+        let Lens { origin, direction, forward, meet, .. } = self.lens;
+        let eye = (origin[0] - centre) * scale;
         let offset = DVec2::new(2.0 * self.pixel_offset.x / w, 2.0 * self.pixel_offset.y / h);
         let mut ahead = -eye.dot(forward);
-        let [near, far] = self.clipping_range.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
-        match self.camera.projection {
-            Projection::Perspective { view_angle } => {
-                if eye.length() <= near_eye || ahead < 0.0 {
-                    ahead = 0.0;
-                }
-                let tan = (view_angle.to_radians() / 2.0).tan();
-                let direction = [forward, right * (tan * w / h), up * tan];
-                let origin = [eye + forward * ahead, direction[1] * ahead, direction[2] * ahead];
-                Fan { origin, direction, ahead, near: near.max(0.0) * scale - ahead, far: far * scale - ahead, offset }
-            }
-            Projection::Parallel { parallel_scale: s } => {
-                let origin = [eye + forward * ahead, right * (s * scale * w / h), up * (s * scale)];
-                let direction = [forward, DVec3::ZERO, DVec3::ZERO];
-                Fan { origin, direction, ahead, near: near * scale - ahead, far: far * scale - ahead, offset }
+        let [mut near, far] = self.clipping_range.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+        if meet {
+            near = near.max(0.0);
+            if eye.length() <= near_eye || ahead < 0.0 {
+                ahead = 0.0;
             }
         }
+        let middle = eye + direction[0] * ahead;
+        let aside = [1, 2].map(|k| origin[k] * scale + direction[k] * ahead);
+        let origin = [middle, aside[0], aside[1]];
+        Fan { origin, direction, ahead, near: near * scale - ahead, far: far * scale - ahead, offset }
     }
 
     /// The ray of pixel (column `i`, row `j`), with the part of it that clipping and depth leave.
     pub fn ray(&self, i: u32, j: u32) -> Ray {
         let (x, y) = (f64::from(i) + 0.5 + self.pixel_offset.x, f64::from(j) + 0.5 - self.pixel_offset.y);
         let mut ray = self.ray_through(x, y);
-        let cos = ray.direction.dot(self.axes[2]);
+        let cos = ray.direction.dot(self.lens.forward);
         if let Some([near, far]) = self.clipping_range {
             ray.t_min = ray.t_min.max(near / cos);
             ray.t_max = ray.t_max.min(far / cos);
@@ -337,10 +429,8 @@ impl View {
         if let Some(depth) = &self.depth {
             let d = depth.values[j as usize * self.size[0] as usize + i as usize];
             let t = match (depth.kind, self.clipping_range) {
-                (DepthKind::Window, Some([near, far])) => match self.camera.projection {
-                    Projection::Perspective { .. } => near * far / (far - d * (far - near)) / cos,
-                    Projection::Parallel { .. } => (near + d * (far - near)) / cos,
-                },
+                (DepthKind::Window, Some([near, far])) if self.lens.meet => near * far / (far - d * (far - near)) / cos,
+                (DepthKind::Window, Some([near, far])) => (near + d * (far - near)) / cos,
                 (DepthKind::Ray, _) => d,
                 _ => d / cos,
             };
@@ -351,7 +441,160 @@ impl View {
     }
 }
 
+fn check_size([w, h]: [u32; 2]) -> Result<()> {
+    if w == 0 || h == 0 || u64::from(w) * u64::from(h) > 1 << 28 {
+        return Err(Error::View(format!("an image of {w}x{h} pixels")));
+    }
+    Ok(())
+}
+
 /// `v` scaled to length 1, whatever its length; none if it is zero or not finite.
 fn direction(v: DVec3) -> Option<DVec3> {
     (v / v.abs().max_element()).try_normalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: [u32; 2] = [64, 48];
+
+    fn camera(projection: Projection) -> View {
+        let [position, focal_point, view_up] =
+            [[1.0, -2.0, 3.5], [0.3, 0.1, -0.4], [0.1, 1.0, 0.2]].map(DVec3::from_array);
+        let camera = Camera { position, focal_point, view_up, projection };
+        View::new(camera, SIZE).unwrap().with_clipping_range([0.5, 90.0]).unwrap()
+    }
+
+    fn to_eye(eye: DVec3, forward: DVec3, up: DVec3) -> DMat4 {
+        let forward = forward.normalize();
+        let right = forward.cross(up).normalize();
+        let axes = DMat3::from_cols(right, right.cross(forward), -forward).transpose();
+        DMat4::from_mat3(axes) * DMat4::from_translation(-eye)
+    }
+
+    /// With the near plane at n and the far plane at f; `half` is half the height at depth 1.
+    fn perspective(half: f64, aspect: f64, n: f64, f: f64) -> DMat4 {
+        let (z, w) = (-(f + n) / (f - n), -2.0 * f * n / (f - n));
+        let column = glam::DVec4::new;
+        DMat4::from_cols(
+            column(1.0 / (half * aspect), 0.0, 0.0, 0.0),
+            column(0.0, 1.0 / half, 0.0, 0.0),
+            column(0.0, 0.0, z, -1.0),
+            column(0.0, 0.0, w, 0.0),
+        )
+    }
+
+    /// OpenGL's matrices of the same camera, but for rows and columns of the projection that `change` alters.
+    fn matrices(projection: Projection, change: impl Fn(&mut DMat4)) -> View {
+        let view = camera(projection);
+        let c = *view.camera().unwrap();
+        let to_eye = to_eye(c.position, c.focal_point - c.position, c.view_up);
+        let aspect = 64.0 / 48.0;
+        let mut to_clip = match c.projection {
+            Projection::Perspective { view_angle } => {
+                perspective((view_angle.to_radians() / 2.0).tan(), aspect, 0.5, 90.0)
+            }
+            Projection::Parallel { parallel_scale: s } => {
+                DMat4::from_scale(DVec3::new(1.0 / (s * aspect), 1.0 / s, -2.0 / 89.5))
+                    * DMat4::from_translation(DVec3::new(0.0, 0.0, 45.25))
+            }
+        };
+        change(&mut to_clip);
+        View::from_matrices(to_eye, to_clip, SIZE).unwrap()
+    }
+
+    const PROJECTIONS: [Projection; 2] =
+        [Projection::Perspective { view_angle: 40.0 }, Projection::Parallel { parallel_scale: 2.0 }];
+
+    fn ends(ray: &Ray) -> [DVec3; 2] {
+        [ray.t_min, ray.t_max].map(|t| ray.origin + ray.direction * t)
+    }
+
+    #[test]
+    fn matrices_and_camera_say_the_same() {
+        for projection in PROJECTIONS {
+            let depth = |view: View| {
+                let values = (0..64 * 48).map(|i| f64::from(i) / (64.0 * 48.0)).collect();
+                view.with_depth(DepthBuffer { kind: DepthKind::Window, values }).unwrap()
+            };
+            let (a, b) = (depth(camera(projection)), depth(matrices(projection, |_| ())));
+            assert!(a.forward().distance(b.forward()) < 1e-12);
+            assert_eq!(a.eye().is_some(), b.eye().is_some());
+            for (i, j) in [(0, 0), (63, 0), (10, 40), (63, 47)] {
+                let (a, b) = (a.ray(i, j), b.ray(i, j));
+                assert!(a.direction.distance(b.direction) < 1e-12, "{a:?} {b:?}");
+                for (a, b) in ends(&a).into_iter().zip(ends(&b)) {
+                    assert!(a.distance(b) < 1e-9, "{projection:?}: {a} {b}");
+                }
+            }
+        }
+    }
+
+    /// A lens shifted in the image plane, and one whose rays lean as those of one of two eyes do.
+    fn altered() -> Vec<View> {
+        let shift = |m: &mut DMat4| {
+            *m = DMat4::from_translation(DVec3::new(0.7, -0.3, 0.0)) * *m;
+        };
+        let lean = |m: &mut DMat4| {
+            let mut shear = DMat4::IDENTITY;
+            shear.z_axis.x = 0.2;
+            shear.w_axis.x = 0.5;
+            *m *= shear;
+        };
+        PROJECTIONS.into_iter().flat_map(|p| [matrices(p, shift), matrices(p, lean), camera(p)]).collect()
+    }
+
+    #[test]
+    fn points_of_a_ray_are_seen_where_it_passes() {
+        for view in altered() {
+            for (x, y) in [(0.5, 0.5), (40.25, 3.0), (63.5, 47.5)] {
+                let ray = view.ray_through(x, y);
+                for t in [1.0, 7.0] {
+                    let at = view.pixel(ray.origin + ray.direction * t).unwrap();
+                    assert!(at.distance(DVec2::new(x, y)) < 1e-9, "{at} {x} {y}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn fan_and_rays_are_the_same_lines() {
+        let (centre, scale) = (DVec3::new(0.2, 0.1, -0.3), 0.25);
+        for view in altered() {
+            let fan = view.fan(centre, scale, 0.0);
+            for (i, j) in [(0, 0), (20, 33), (63, 47)] {
+                let (x, y) = ((2.0 * f64::from(i) + 1.0) / 64.0 - 1.0, 1.0 - (2.0 * f64::from(j) + 1.0) / 48.0);
+                let at = |[m, r, u]: [DVec3; 3]| m + r * x + u * y;
+                let (origin, direction) = (at(fan.origin), at(fan.direction));
+                assert!((direction.dot(view.forward()) - 1.0).abs() < 1e-12);
+                let ray = view.ray(i, j);
+                let normalised = ends(&ray).map(|p| (p - centre) * scale);
+                for (t, end) in [fan.near, fan.far].into_iter().zip(normalised) {
+                    assert!((origin + direction * t).distance(end) < 1e-9, "{view:?} {t} {end}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_far_plane_far_away_costs_no_digits() {
+        let eye = DVec3::new(5e5, 4e6, 120.0);
+        let to_clip = perspective(0.3, 64.0 / 48.0, 1e-3, 1e9);
+        let view = View::from_matrices(to_eye(eye, DVec3::NEG_Z, DVec3::Y), to_clip, SIZE).unwrap();
+        assert!(view.eye().unwrap().distance(eye) < 1e-8);
+        assert!(view.ray_through(32.0, 24.0).direction.distance(DVec3::NEG_Z) < 1e-14);
+    }
+
+    #[test]
+    fn useless_matrices_are_refused() {
+        let good = perspective(0.3, 1.0, 0.1, 10.0);
+        let nan = DMat4::from_scale(DVec3::splat(f64::NAN));
+        let flat = DMat4::from_scale(DVec3::new(1.0, 0.0, 1.0));
+        for (view, projection) in
+            [(nan, good), (flat, good), (DMat4::IDENTITY, flat), (DMat4::IDENTITY, DMat4::ZERO), (good, good)]
+        {
+            assert!(View::from_matrices(view, projection, SIZE).is_err(), "{view} {projection}");
+        }
+    }
 }

@@ -253,8 +253,8 @@ impl Tetrahedra {
     /// Splits the cells of `mesh`, on the current rayon pool.
     ///
     /// # Errors
-    /// [`Error::Mesh`] if no 3D cell is left to draw, if a cell has not the number of points that its type demands, or
-    /// if there would be more than [`MAX_TETRAHEDRA`], or 2³² points.
+    /// [`Error::Empty`] if no 3D cell is left to draw; [`Error::Mesh`] if a cell has not the number of points that its type
+    /// demands, or if there would be more than [`MAX_TETRAHEDRA`], or 2³² points.
     pub fn new(mesh: &Mesh) -> Result<Self> {
         let splitter = Splitter::new(mesh);
         let n = mesh.cells().len();
@@ -266,7 +266,7 @@ impl Tetrahedra {
         let counted: Vec<usize> = counts.iter().map(|count| count.tetrahedra).collect();
         let (total, first) = (counted.iter().sum::<usize>(), mesh.points().len());
         if total == 0 {
-            return Err(Error::Mesh(nothing_left(mesh, &skipped)));
+            return Err(Error::Empty(nothing_left(mesh, &skipped)));
         }
         let added: usize = counts.iter().map(|count| count.added).sum();
         if total > MAX_TETRAHEDRA || first + added >= u32::MAX as usize {

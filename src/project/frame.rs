@@ -3,9 +3,9 @@
 use crate::field::Kind;
 use crate::integral::{Exact, Knots};
 use crate::traverse::Geometry;
-use crate::view::{Fan, Projection, View};
+use crate::view::{Fan, View};
 use bytemuck::{Pod, Zeroable};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
 /// Stands for ±∞ in limits of t, which are within ±10 else.
@@ -52,12 +52,13 @@ pub(super) struct Seen {
 impl Seen {
     pub(super) fn new(geometry: &Geometry, view: &View) -> Self {
         let fan = view.fan(geometry.centre, geometry.scale, NEAR_EYE);
-        let [base, forward] = [fan.origin[0], fan.direction[0]];
+        let base = fan.origin[0];
         let four = |v: DVec3, w: f64| v.extend(w).as_vec4().to_array();
         let high = base.as_vec3().as_dvec3();
-        let perspective = matches!(view.camera().projection, Projection::Perspective { .. });
+        let perspective = view.eye().is_some();
         // What the image spans at depth 1 (perspective) or at any (parallel).
         let spans = if perspective { [fan.direction[1], fan.direction[2]] } else { [fan.origin[1], fan.origin[2]] };
+        let inverse = DMat3::from_cols(spans[0], spans[1], fan.direction[0]).inverse();
         let planes: Vec<[f32; 4]> = view
             .clipping_planes()
             .iter()
@@ -71,8 +72,8 @@ impl Seen {
         let frame = Frame {
             base: four(high, 0.0),
             base_low: four(base - high, 0.0),
-            across: spans.map(|v| four(v / v.length_squared(), 0.0)),
-            forward: four(forward, if perspective { fan.ahead } else { 0.0 }),
+            across: [0, 1].map(|k| four(inverse.row(k), 0.0)),
+            forward: four(inverse.row(2), if perspective { fan.ahead } else { 0.0 }),
             origin: [fan.origin[1], fan.origin[2]].map(|v| four(v, 0.0)),
             direction: fan.direction.map(|v| four(v, 0.0)),
             size: view.size().map(|n| n as f32),
@@ -98,7 +99,7 @@ fn ends(view: &View, fan: &Fan, scale: f64) -> Vec<f32> {
     let pixels = 0..w as usize * h as usize;
     let end = |p: usize| {
         let ray = view.ray((p % w as usize) as u32, (p / w as usize) as u32);
-        let start = fan.ahead / ray.direction.dot(fan.direction[0]);
+        let start = fan.ahead / ray.direction.dot(view.forward());
         ((ray.t_max * scale - start) as f32).clamp(-FAR, FAR)
     };
     pixels.into_par_iter().map(end).collect()

@@ -8,10 +8,11 @@ use crate::cell::{Face, Frame};
 use crate::image::Image;
 use crate::integral::{Batch, Exact, Light};
 use crate::mesh::faces::BOUNDARY;
-use crate::view::{Blend, Projection, View};
+use crate::view::{Blend, View};
 use glam::DVec2;
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 
 /// Width and height of the square of pixels whose rays share their search for entries.
 const TILE: u32 = 8;
@@ -41,28 +42,34 @@ pub struct Counts {
 }
 
 /// Draws a frame on the current rayon pool. `pixel` turns the largest values along a ray into a premultiplied colour for
-/// [`Blend::Maximum`]; `progress` is told the share that is done.
+/// [`Blend::Maximum`]; `progress` is told the share that is done, and may say that no more is wanted: the rest stays empty.
 pub fn render<const N: usize>(
     geometry: &Geometry,
     values: &Values<N>,
     exact: &Exact<f32>,
     pixel: &(dyn Fn(&[f32; N]) -> [f32; 4] + Sync),
     view: &View,
-    progress: &(dyn Fn(f64) + Sync),
+    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
 ) -> (Image, Counts) {
     let mut image = Image::new(view.size());
     let [w, h] = view.size();
     let (done, bands) = (AtomicUsize::new(0), h.div_ceil(TILE) as usize);
+    let stopped = AtomicBool::new(false);
     let counts = image
         .pixels
         .par_chunks_mut((w * TILE) as usize)
         .enumerate()
         .map(|(band, rows)| {
             let mut tracer = Tracer::new(geometry, values, exact, view);
+            if stopped.load(Relaxed) {
+                return tracer.counts;
+            }
             for left in (0..w).step_by(TILE as usize) {
                 tracer.tile(left, band as u32 * TILE, rows, pixel);
             }
-            progress((done.fetch_add(1, Relaxed) + 1) as f64 / bands as f64);
+            if progress((done.fetch_add(1, Relaxed) + 1) as f64 / bands as f64).is_break() {
+                stopped.store(true, Relaxed);
+            }
             tracer.counts
         })
         .reduce(Counts::default, |a, b| Counts {
@@ -121,10 +128,11 @@ struct Tracer<'a, const N: usize> {
 
 impl<'a, const N: usize> Tracer<'a, N> {
     fn new(geometry: &'a Geometry, values: &'a Values<N>, exact: &'a Exact<f32>, view: &'a View) -> Self {
-        let eye = (view.camera().position - geometry.centre) * geometry.scale;
         let [low, high] = geometry.boundary.bounds();
-        let inside = eye.cmpge(low).all() && eye.cmple(high).all();
-        let both_ways = inside && matches!(view.camera().projection, Projection::Perspective { .. });
+        let both_ways = view.eye().is_some_and(|eye| {
+            let eye = (eye - geometry.centre) * geometry.scale;
+            eye.cmpge(low).all() && eye.cmple(high).all()
+        });
         Tracer {
             geometry,
             values,

@@ -457,7 +457,7 @@ fn ends(view: &View, fan: &Fan, scale: f64) -> Vec<f32> {
     let pixels = 0..w as usize * h as usize;
     let end = |p: usize| {
         let ray = view.ray((p % w as usize) as u32, (p / w as usize) as u32);
-        let cos = ray.direction.dot(fan.direction[0]);
+        let cos = ray.direction.dot(view.forward());
         ((ray.t_max * scale * cos - fan.ahead) as f32).clamp(-FAR, FAR)
     };
     pixels.into_par_iter().map(end).collect()

@@ -1,0 +1,335 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+/**
+ * @file halite.h
+ * @brief Halite for C++17: exact volume rendering of unstructured grids, with no VTK in sight.
+ *
+ * @code
+ * halite::Mesh mesh = halite::Mesh::open("disk.vtu");
+ * halite::Renderer renderer;
+ * renderer.setMesh(mesh);
+ * renderer.setField(mesh, "Temp");
+ * halite::TransferFunction function;
+ * function.color = { { 293, { 0, 0, 1 } }, { 913, { 1, 0, 0 } } };
+ * function.opacity = { { 293, 0 }, { 913, 1 } };
+ * renderer.setTransferFunction(function);
+ * halite::View view;
+ * view.camera.position = { 0, -30, 10 };
+ * std::vector<float> pixels(4 * view.width * view.height);
+ * renderer.render(view, pixels.data());
+ * @endcode
+ *
+ * What fails throws halite::Error, whose what() is one line that says what, where, and what would help; no call ends the
+ * program. Objects may be moved, not copied; one may be used by one thread at a time, two by two at once. Until version 1,
+ * a new minor version may change this face, and has another SOVERSION then.
+ */
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#if defined(_WIN32)
+#if defined(halite_EXPORTS)
+#define HALITE_EXPORT __declspec(dllexport)
+#else
+#define HALITE_EXPORT __declspec(dllimport)
+#endif
+#else
+#define HALITE_EXPORT __attribute__((visibility("default")))
+#endif
+
+namespace halite
+{
+
+/// What every failure of Halite is in C++.
+class HALITE_EXPORT Error : public std::runtime_error
+{
+public:
+  using std::runtime_error::runtime_error;
+  ~Error() override;
+};
+
+/// Types of numbers that arrays may be made of.
+enum class Type
+{
+  Int8,
+  UInt8,
+  Int16,
+  UInt16,
+  Int32,
+  UInt32,
+  Int64,
+  UInt64,
+  Float32,
+  Float64
+};
+
+/// Numbers of some type that lie one after another in the caller's memory. They are read during the call only, and not
+/// copied before.
+struct HALITE_EXPORT Numbers
+{
+  const void* data = nullptr;
+  std::size_t count = 0;
+  Type type = Type::Float64;
+
+  Numbers() = default;
+  Numbers(const void* data, std::size_t count, Type type)
+    : data(data)
+    , count(count)
+    , type(type)
+  {
+  }
+  Numbers(const std::vector<float>& v)
+    : Numbers(v.data(), v.size(), Type::Float32)
+  {
+  }
+  Numbers(const std::vector<double>& v)
+    : Numbers(v.data(), v.size(), Type::Float64)
+  {
+  }
+  Numbers(const std::vector<std::uint8_t>& v)
+    : Numbers(v.data(), v.size(), Type::UInt8)
+  {
+  }
+  Numbers(const std::vector<std::int32_t>& v)
+    : Numbers(v.data(), v.size(), Type::Int32)
+  {
+  }
+  Numbers(const std::vector<std::int64_t>& v)
+    : Numbers(v.data(), v.size(), Type::Int64)
+  {
+  }
+};
+
+/// Whether an array has a tuple for each point or for each cell.
+enum class Association
+{
+  Points,
+  Cells
+};
+
+/// What a mesh knows of one of its arrays.
+struct ArrayInfo
+{
+  std::string name;
+  Association association = Association::Points;
+  Type type = Type::Float64;
+  std::size_t components = 0;
+  std::size_t tuples = 0;
+};
+
+/// How many cells of one of VTK's types a mesh has.
+struct CellCount
+{
+  std::uint8_t vtkType = 0;
+  std::string name;
+  std::size_t count = 0;
+};
+
+/// Level of a line of the log.
+enum class Level
+{
+  Info,
+  Warning,
+  Error
+};
+
+/// Sends the log to `sink` from now on. It is called at the end of those calls of this library that logged something, on
+/// their thread. An empty sink ends that.
+HALITE_EXPORT void setLog(std::function<void(Level, const std::string&)> sink);
+
+/// The version of the library, such as "0.1.0".
+HALITE_EXPORT const char* version();
+
+/// An unstructured grid: points, cells of VTK's types, arrays.
+class HALITE_EXPORT Mesh
+{
+public:
+  /// Reads a .vtu or legacy .vtk file.
+  static Mesh open(const std::string& path);
+
+  /// Makes a mesh of `points` (x, y, z for each; any type of number) and cells as vtkCellArray keeps them: `types` has VTK's
+  /// type of each cell, cell i has the points `connectivity[offsets[i]]` up to `connectivity[offsets[i + 1]]`, so that there
+  /// is one offset more than cells. Offsets and connectivity are integers of 32 or 64 bits.
+  Mesh(Numbers points, Numbers types, Numbers offsets, Numbers connectivity);
+
+  Mesh(Mesh&&) noexcept;
+  Mesh& operator=(Mesh&&) noexcept;
+  ~Mesh();
+
+  /// Adds a copy of an array, in tuples of `components`. One called "vtkGhostType" says which cells and points are
+  /// left out, as in VTK.
+  void addArray(const std::string& name, Association, std::size_t components, Numbers);
+
+  /// The arrays, those of points first.
+  std::vector<ArrayInfo> arrays() const;
+  /// The numbers of an array, which is counted as arrays() does.
+  std::vector<double> arrayValues(std::size_t index) const;
+  /// How many cells there are of each type.
+  std::vector<CellCount> cellCounts() const;
+  /// x, y and z of each point.
+  std::vector<double> points() const;
+  /// VTK's type of each cell.
+  std::vector<std::uint8_t> types() const;
+  /// Where the points of each cell start in connectivity(), and the end.
+  std::vector<std::uint64_t> offsets() const;
+  /// The points of the cells.
+  std::vector<std::uint32_t> connectivity() const;
+
+private:
+  friend class Renderer;
+  struct Inner;
+  std::unique_ptr<Inner> Data;
+};
+
+/// What of an array's tuples is drawn: a component, counted from 0, or one of these.
+enum Component : int
+{
+  /// The Euclidean length of the tuple.
+  Magnitude = -1,
+  /// All of them: two are a value of the colour function and one of the opacity function; four are red, green and blue (0 to 1,
+  /// or bytes) and a value of the opacity function.
+  AllComponents = -2
+};
+
+/// How opacity a and the unit distance d give the extinction per unit of length.
+enum class OpacityConvention
+{
+  /// a / d, as in VTK's mappers of unstructured grids.
+  Extinction,
+  /// −ln(1 − a) / d, as in VTK's mappers of image data: a is the opacity of a slab d thick.
+  Opacity
+};
+
+/// Colour and opacity, piecewise linear between knots that ascend in the scalar; constant beyond them. Two knots at one scalar
+/// are a step.
+struct TransferFunction
+{
+  struct ColorKnot
+  {
+    double scalar;
+    std::array<double, 3> rgb;
+  };
+  struct OpacityKnot
+  {
+    double scalar;
+    double opacity;
+  };
+  std::vector<ColorKnot> color;
+  std::vector<OpacityKnot> opacity;
+  double unitDistance = 1;
+  OpacityConvention convention = OpacityConvention::Extinction;
+};
+
+/// VTK's camera, in world coordinates.
+struct Camera
+{
+  std::array<double, 3> position = { 0, 0, 1 };
+  std::array<double, 3> focalPoint = { 0, 0, 0 };
+  std::array<double, 3> viewUp = { 0, 1, 0 };
+  bool parallel = false;
+  /// The vertical angle of view in degrees, for perspective views.
+  double viewAngle = 30;
+  /// Half the height of a parallel view.
+  double parallelScale = 1;
+  /// What is seen lies between these distances along the view; everything does unless near < far.
+  std::array<double, 2> clippingRange = { 0, 0 };
+};
+
+/// A plane that keeps what its normal points into.
+struct ClippingPlane
+{
+  std::array<double, 3> origin;
+  std::array<double, 3> normal;
+};
+
+/// What to draw, and where from.
+struct View
+{
+  std::uint32_t width = 640;
+  std::uint32_t height = 480;
+  Camera camera;
+  /// OpenGL's matrices, rows one after another, take the place of the camera if they are given: from the world to the eye, and
+  /// from there to clip coordinates. Any frustum can be had so.
+  const std::array<double, 16>* worldToEye = nullptr;
+  const std::array<double, 16>* eyeToClip = nullptr;
+  std::vector<ClippingPlane> planes;
+  /// One depth in [0, 1] for each pixel, as OpenGL has it, at which its ray ends; needs matrices or a clipping range.
+  const float* depths = nullptr;
+  /// Whether row 0 of depths and pixels is the lowest, as in OpenGL, or the uppermost.
+  bool bottomUp = false;
+  /// Draw the largest value along each ray instead of the integral.
+  bool maximum = false;
+};
+
+/// What a renderer did, and how long it took.
+struct Statistics
+{
+  std::string engine, device, adapter;
+  std::uint64_t cells = 0, tetrahedra = 0;
+  double facesMs = 0, uploadMs = 0, frameMs = 0;
+  std::uint64_t steps = 0, repairedRays = 0, deviceBytes = 0, uploadedBytes = 0;
+};
+
+/// How a renderer works; fixed once it is made. Empty names mean "auto".
+struct Settings
+{
+  /// 0: one for each core.
+  std::size_t threads = 0;
+  /// "auto", "cpu", or a GPU by index, UUID or part of its name.
+  std::string device;
+  /// "auto" or "traverse".
+  std::string engine;
+  /// "auto" or "exact".
+  std::string integral;
+};
+
+/// Draws one mesh as often as wanted; keeps what does not change between frames.
+class HALITE_EXPORT Renderer
+{
+public:
+  /// Told the share that is done, in [0, 1], every 20 ms while a frame is drawn, on the thread that called; false ends it. It may
+  /// throw: render() then throws an Error with what it said.
+  using Progress = std::function<bool(double)>;
+  /// A matrix from the mesh's coordinates to the world, rows one after another; affine.
+  using Matrix = std::array<double, 16>;
+
+  explicit Renderer(const Settings& = {});
+  Renderer(Renderer&&) noexcept;
+  Renderer& operator=(Renderer&&) noexcept;
+  ~Renderer();
+
+  /// Draws `mesh`, which is not needed afterwards; the field must be set again. Lengths along rays are lengths in the world.
+  void setMesh(const Mesh& mesh, const Matrix* matrix = nullptr);
+  /// Moves the points of the mesh, or only its matrix, and keeps all else. False if that cannot be, because the new matrix makes
+  /// a mirror image of the old one: then set the mesh again.
+  bool movePoints(Numbers points, const Matrix* matrix = nullptr);
+  bool movePoints(const Mesh& mesh, const Matrix* matrix = nullptr);
+  /// Draws an array of the mesh.
+  void setField(const Mesh& mesh, const std::string& name, int component = 0);
+  /// Draws numbers, in tuples of `components`, one for each point or cell of the mesh.
+  void setField(const std::string& name, Association, std::size_t components, int component, Numbers);
+  void setTransferFunction(const TransferFunction&);
+  /// Draws into `pixels`: linear premultiplied red, green, blue and opacity of each pixel, row by row. False if `progress` ended
+  /// it; `pixels` are then as they were.
+  bool render(const View& view, float* pixels, const Progress& progress = {});
+
+  Statistics statistics() const;
+
+private:
+  struct Inner;
+  std::unique_ptr<Inner> Data;
+};
+
+/// Writes `pixels` as render() makes them (row 0 uppermost) to a .png, .exr or .npy file. A .png shows them over `background`, or has
+/// an alpha channel without one.
+HALITE_EXPORT void saveImage(const std::string& path, std::uint32_t width, std::uint32_t height, const float* pixels,
+  const std::array<float, 3>* background = nullptr);
+
+}

@@ -1,0 +1,23 @@
+# Installs Halite to a folder, builds a project against it, and runs that.
+macro(run)
+  execute_process(COMMAND ${ARGN} RESULT_VARIABLE failed)
+  if (failed)
+    message(FATAL_ERROR "failed (${failed}): ${ARGN}")
+  endif ()
+endmacro ()
+file(REMOVE_RECURSE "${FOLDER}")
+run("${CMAKE_COMMAND}" --install "${BUILD}" --prefix "${FOLDER}/prefix")
+foreach (file IN ITEMS include/halite.h "${LIBDIR}/libhalite.so" "${DATADIR}/doc/halite/THIRD-PARTY-NOTICES.txt"
+    "${DATADIR}/doc/halite/LICENSE-MIT")
+  if (NOT EXISTS "${FOLDER}/prefix/${file}")
+    message(FATAL_ERROR "${file} is not installed")
+  endif ()
+endforeach ()
+get_filename_component(tests "${SOURCE}" DIRECTORY)
+run("${CMAKE_COMMAND}" -S "${SOURCE}" -B "${FOLDER}/build" -G "${GENERATOR}" "-DCMAKE_PREFIX_PATH=${FOLDER}/prefix"
+  "-DWITH_VTK=${WITH_VTK}" "-DTESTS=${tests}")
+run("${CMAKE_COMMAND}" --build "${FOLDER}/build")
+run("${FOLDER}/build/without_vtk" "${MESH}" "${FOLDER}/cube.png" s)
+if (WITH_VTK)
+  run(${DISPLAY} "${FOLDER}/build/with_vtk")
+endif ()

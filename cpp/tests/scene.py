@@ -1,0 +1,291 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""What the tests share: grids, windows, and the truth about boxes.
+
+A box that is filled with a field linear in x, y and z looks the same however it is cut into cells, so its picture can be had
+without cells: `truth` integrates along the ray of each pixel, which it takes from VTK's camera.
+"""
+import os
+import sys
+import time
+import traceback
+
+import numpy as np
+import vtkmodules.vtkInteractionStyle  # noqa: F401
+import vtkmodules.vtkRenderingFreeType  # noqa: F401
+import vtkmodules.vtkRenderingVolumeOpenGL2  # noqa: F401
+from vtkmodules.util import numpy_support
+from vtkmodules import vtkCommonCore, vtkCommonDataModel, vtkCommonMath, vtkFiltersSources, vtkRenderingCore
+
+from halite.vtkHalite import vtkHaliteMapper
+
+TETRA, VOXEL, HEXAHEDRON, WEDGE, PYRAMID, QUAD = 10, 11, 12, 13, 14, 9
+
+# How far a picture of bytes may be from the truth.
+NEAR = 1.5
+
+
+def grid(points, cells, array=None, name="s", of="point", kind=None):
+    """An unstructured grid; `cells` are pairs of a VTK type and point ids."""
+    g = vtkCommonDataModel.vtkUnstructuredGrid()
+    p = vtkCommonCore.vtkPoints()
+    p.SetDataType(kind or vtkCommonCore.VTK_DOUBLE)
+    p.SetData(numpy_support.numpy_to_vtk(np.ascontiguousarray(points), deep=1))
+    g.SetPoints(p)
+    g.Allocate(len(cells))
+    for cell_type, ids in cells:
+        g.InsertNextCell(cell_type, len(ids), [int(i) for i in ids])
+    if array is not None:
+        add(g, array, name, of)
+    return g
+
+
+def add(g, array, name="s", of="point"):
+    a = numpy_support.numpy_to_vtk(np.ascontiguousarray(array), deep=1)
+    a.SetName(name)
+    data = g.GetPointData() if of == "point" else g.GetCellData()
+    data.AddArray(a)
+    if data.GetScalars() is None:
+        data.SetActiveScalars(name)
+    return a
+
+
+def lattice(n=1, low=(0, 0, 0), high=(1, 1, 1), cells="hex", field=lambda p: p[:, 2], dtype=float):
+    """A box of n^3 bricks, as one kind of cell or a mixture of all, with a field at its points."""
+    low, high = np.array(low, float), np.array(high, float)
+    axis = np.arange(n + 1) / n
+    z, y, x = np.meshgrid(axis, axis, axis, indexing="ij")
+    points = low + (high - low) * np.stack([x, y, z], -1).reshape(-1, 3)
+    at = lambda i, j, k: i + (n + 1) * (j + (n + 1) * k)
+    out = []
+    for k in range(n):
+        for j in range(n):
+            for i in range(n):
+                h = [at(i, j, k), at(i + 1, j, k), at(i + 1, j + 1, k), at(i, j + 1, k)]
+                h += [at(i, j, k + 1), at(i + 1, j, k + 1), at(i + 1, j + 1, k + 1), at(i, j + 1, k + 1)]
+                kind = cells if cells != "mixed" else ("hex", "voxel", "tet", "wedge", "pyramid")[(i + 2 * j + 3 * k) % 5]
+                if kind == "hex":
+                    out.append((HEXAHEDRON, h))
+                elif kind == "voxel":
+                    out.append((VOXEL, [h[q] for q in (0, 1, 3, 2, 4, 5, 7, 6)]))
+                elif kind == "tet":
+                    for t in ((0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6)):
+                        out.append((TETRA, [h[q] for q in t]))
+                elif kind == "wedge":
+                    out += [(WEDGE, [h[q] for q in (0, 3, 1, 4, 7, 5)]), (WEDGE, [h[q] for q in (2, 1, 3, 6, 5, 7)])]
+                else:
+                    # Six pyramids would need a point in the middle; two tetrahedra and a pyramid on a corner do not.
+                    out += [(PYRAMID, [h[q] for q in (0, 1, 2, 3, 4)]), (PYRAMID, [h[q] for q in (1, 2, 6, 5, 4)]),
+                            (PYRAMID, [h[q] for q in (2, 3, 7, 6, 4)])]
+    points = points.astype(dtype)
+    return grid(points, out, field(points.astype(float)))
+
+
+def colors(knots, space=None):
+    f = vtkRenderingCore.vtkColorTransferFunction()
+    for s, r, g, b in knots:
+        f.AddRGBPoint(s, r, g, b)
+    if space:
+        getattr(f, "SetColorSpaceTo" + space)()
+    return f
+
+
+def opacities(knots):
+    f = vtkCommonDataModel.vtkPiecewiseFunction()
+    for s, a in knots:
+        f.AddPoint(s, a)
+    return f
+
+
+WHITE = [(0, 1, 1, 1)]
+
+
+def volume(g, opacity=((0, 1),), color=WHITE, unit=1.0, mapper=None, **settings):
+    m = mapper or vtkHaliteMapper()
+    m.SetInputData(g)
+    for name, value in settings.items():
+        getattr(m, "Set" + name)(value)
+    p = vtkRenderingCore.vtkVolumeProperty()
+    p.SetColor(color if isinstance(color, vtkCommonCore.vtkObject) else colors(color))
+    p.SetScalarOpacity(opacity if isinstance(opacity, vtkCommonCore.vtkObject) else opacities(opacity))
+    p.SetScalarOpacityUnitDistance(unit)
+    v = vtkRenderingCore.vtkVolume()
+    v.SetMapper(m)
+    v.SetProperty(p)
+    return v
+
+
+def window(size=(64, 64), samples=0):
+    w = vtkRenderingCore.vtkRenderWindow()
+    w.SetMultiSamples(samples)
+    w.SetAlphaBitPlanes(1)
+    w.SetSize(*size)
+    return w
+
+
+def renderer(w, *props, viewport=None, background=(0, 0, 0)):
+    r = vtkRenderingCore.vtkRenderer()
+    r.SetBackground(*background)
+    if viewport:
+        r.SetViewport(*viewport)
+    w.AddRenderer(r)
+    for p in props:
+        r.AddViewProp(p)
+    return r
+
+
+def look(r, position=(2.1, -1.7, 2.9), focus=(0.5, 0.5, 0.5), up=(0, 0, 1), angle=30, parallel=None, clip=None):
+    c = r.GetActiveCamera()
+    c.SetPosition(*position)
+    c.SetFocalPoint(*focus)
+    c.SetViewUp(*up)
+    c.SetViewAngle(angle)
+    if parallel:
+        c.ParallelProjectionOn()
+        c.SetParallelScale(parallel)
+    r.ResetCameraClippingRange() if clip is None else c.SetClippingRange(*clip)
+    return c
+
+
+def scene(*props, size=(64, 64), samples=0, **camera):
+    w = window(size, samples)
+    r = renderer(w, *props)
+    look(r, **camera)
+    return w, r
+
+
+def pixels(w, render=True, buffer=0):
+    """What a window shows, as (h, w, 4) bytes; row 0 is the lowest."""
+    if render:
+        w.Render()
+    width, height = w.GetSize()
+    out = vtkCommonCore.vtkUnsignedCharArray()
+    w.GetRGBACharPixelData(0, 0, width - 1, height - 1, 0, out, buffer)
+    return numpy_support.vtk_to_numpy(out).reshape(height, width, 4).astype(int)
+
+
+def rows(m):
+    return np.array([[m.GetElement(i, j) for j in range(4)] for i in range(4)])
+
+
+def rays(r, size):
+    """Origin (on the near plane) and far end of each pixel's ray in the world, as VTK's camera has it."""
+    w, h = size
+    m = np.linalg.inv(rows(r.GetActiveCamera().GetCompositeProjectionTransformMatrix(w / h, -1, 1)))
+    x, y = np.meshgrid((np.arange(w) + 0.5) / w * 2 - 1, (np.arange(h) + 0.5) / h * 2 - 1)
+    ends = []
+    for z in (-1, 1):
+        p = np.stack([x, y, np.full_like(x, z), np.ones_like(x)], -1) @ m.T
+        ends.append(p[..., :3] / p[..., 3:])
+    return ends
+
+
+def interpolate(knots, s):
+    knots = np.array(knots, float)
+    return np.stack([np.interp(s, knots[:, 0], knots[:, k]) for k in range(1, knots.shape[1])], -1)
+
+
+def truth(r, size, low=(0, 0, 0), high=(1, 1, 1), field=lambda p: p[..., 2], opacity=((0, 1),), color=WHITE, unit=1.0,
+          matrix=np.eye(4), keep=lambda p: True, maximum=False, steps=300, slab=False):
+    """The picture of a box under `matrix`, in bytes, of what `keep` says of points in the world."""
+    start, end = rays(r, size)
+    inverse = np.linalg.inv(matrix)
+    to_model = lambda p: p @ inverse[:3, :3].T + inverse[:3, 3]
+    a, b = to_model(start), to_model(end)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t0, t1 = (np.array(low) - a) / (b - a), (np.array(high) - a) / (b - a)
+    near = np.nanmax(np.minimum(t0, t1), -1).clip(0, 1)
+    far = np.nanmin(np.maximum(t0, t1), -1).clip(0, 1)
+    far = np.maximum(near, far)
+    u = (np.arange(steps) + 0.5) / steps
+    t = near[..., None] + (far - near)[..., None] * u
+    world = start[..., None, :] + (end - start)[..., None, :] * t[..., None]
+    length = np.linalg.norm(end - start, axis=-1) * (far - near) / steps
+    s = field(to_model(world))
+    alpha = interpolate(opacity, s)[..., 0] * keep(world)
+    rgb = interpolate(color, s)
+    if maximum:
+        inside = (far > near)[..., None] & np.broadcast_to(keep(world), s.shape)
+        best = np.max(np.where(inside, s, -np.inf), -1)
+        seen = np.isfinite(best)
+        top = np.where(seen, best, 0)
+        a = interpolate(opacity, top)[..., 0].clip(0, 1) * seen
+        return 255 * np.concatenate([interpolate(color, top) * a[..., None], a[..., None]], -1)
+    tau = (-np.log1p(-alpha) if slab else alpha) / unit * length[..., None]
+    through = np.exp(-np.cumsum(tau, -1))
+    before = np.concatenate([np.ones_like(through[..., :1]), through[..., :-1]], -1)
+    light = np.sum((before - through)[..., None] * rgb, -2)
+    return 255 * np.concatenate([light, 1 - through[..., -1:]], -1)
+
+
+def check(picture, expected, near=NEAR, what=""):
+    """Fails unless the two are near each other everywhere, and something is to be seen."""
+    apart = np.abs(picture - expected)
+    worst = np.unravel_index(np.argmax(apart), apart.shape)
+    assert np.max(expected) > 20, f"{what}: there is nothing to compare with"
+    if apart[worst] > near:
+        save(picture, "picture")
+        save(np.broadcast_to(expected, picture.shape), "expected")
+        raise AssertionError(f"{what}: {apart[worst]:.2f} apart at {worst}, mean {apart.mean():.3f}: "
+                             f"{picture[worst[:2]]} is not {np.broadcast_to(expected, picture.shape)[worst[:2]]}")
+    return apart[worst]
+
+
+def save(picture, name):
+    folder = os.environ.get("HALITE_TEST_OUTPUT")
+    if folder:
+        np.save(os.path.join(folder, f"{os.path.basename(sys.argv[0])}-{name}.npy"), picture)
+
+
+def transform(m):
+    t = vtkCommonMath.vtkMatrix4x4()
+    for i in range(4):
+        for j in range(4):
+            t.SetElement(i, j, m[i][j])
+    return t
+
+
+def plane(z, color=(0, 0, 0), half=50.0):
+    """An opaque square at a height, facing up and down."""
+    s = vtkFiltersSources.vtkPlaneSource()
+    s.SetOrigin(-half, -half, z)
+    s.SetPoint1(half, -half, z)
+    s.SetPoint2(-half, half, z)
+    m = vtkRenderingCore.vtkPolyDataMapper()
+    m.SetInputConnection(s.GetOutputPort())
+    a = vtkRenderingCore.vtkActor()
+    a.SetMapper(m)
+    a.GetProperty().SetColor(*color)
+    a.GetProperty().LightingOff()
+    return a
+
+
+class Errors:
+    """Collects what VTK objects say instead of printing it."""
+
+    def __init__(self, *objects):
+        self.said = []
+        for o in objects:
+            o.AddObserver("ErrorEvent", self.note)
+            o.AddObserver("WarningEvent", self.note)
+
+    def note(self, *_):
+        self.said.append("")
+
+    def __len__(self):
+        return len(self.said)
+
+
+def main(names):
+    """Runs all functions called test_*; exits with 1 if one failed."""
+    failed = 0
+    for name, test in names.items():
+        if name.startswith("test_") and (len(sys.argv) < 2 or sys.argv[1] in name):
+            start = time.time()
+            try:
+                test()
+                print(f"ok      {name} ({time.time() - start:.2f} s)", flush=True)
+            except Exception:
+                failed += 1
+                print(f"FAILED  {name}", flush=True)
+                traceback.print_exc()
+    sys.exit(1 if failed else 0)

@@ -1,0 +1,13 @@
+# Nothing of Rust may be seen from outside: a program may hold another Rust.
+execute_process(COMMAND "${NM}" -D --defined-only "${LIBRARY}" OUTPUT_VARIABLE symbols RESULT_VARIABLE failed)
+if (failed)
+  message(FATAL_ERROR "nm failed on ${LIBRARY}")
+endif ()
+string(REGEX MATCHALL "[^\n]*(rust_|_RN|cxxbridge|__rg_|core3|alloc5)[^\n]*" seen "${symbols}")
+string(REGEX MATCHALL "[^\n]*6halite[^\n]*" ours "${symbols}")
+list(LENGTH seen bad)
+list(LENGTH ours good)
+message(STATUS "${good} symbols of Halite, ${bad} of Rust")
+if (bad GREATER 0 OR good EQUAL 0)
+  message(FATAL_ERROR "${seen}")
+endif ()

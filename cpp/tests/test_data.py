@@ -1,0 +1,266 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Arrays of every layout, scalar modes, functions."""
+import numpy as np
+from scene import *  # noqa: F403
+from test_pictures import RAMP, SLANT, TENT, WAVES
+
+BOX = dict(field=SLANT, opacity=WAVES, color=RAMP)
+
+
+def expect(v, what="", near=NEAR, camera=dict(), **expected):
+    w, r = scene(v, **camera)
+    picture = pixels(w)
+    check(picture, truth(r, (64, 64), **{**BOX, **expected}), near, what)
+    return w, r, v.GetMapper()
+
+
+def test_number_types():
+    for kind in (np.float32, np.float64, np.int8, np.uint8, np.int16, np.uint16, np.int32, np.uint32, np.int64, np.uint64):
+        g = lattice(2, field=lambda p: np.round(100 * SLANT(p)).astype(kind))
+        scaled = [(100 * k[0], *k[1:]) for k in WAVES], [(100 * k[0], *k[1:]) for k in RAMP]
+        _, _, m = expect(volume(g, *scaled), kind.__name__)
+        assert m.GetNumberOfCopies() == 0, kind
+
+
+def test_points_of_floats():
+    _, _, m = expect(volume(lattice(2, field=SLANT, dtype=np.float32), WAVES, RAMP))
+    assert m.GetNumberOfCopies() == 0
+
+
+def test_ids_of_32_and_64_bits():
+    for bits in (32, 64):
+        g = lattice(2, field=SLANT)
+        cells = g.GetCells()
+        cells.ConvertTo32BitStorage() if bits == 32 else cells.ConvertTo64BitStorage()
+        _, _, m = expect(volume(g, WAVES, RAMP), f"{bits} bits")
+        assert m.GetNumberOfCopies() == 0
+
+
+def test_structure_of_arrays():
+    from vtkmodules.vtkCommonCore import vtkSOADataArrayTemplate
+    g = lattice(2)
+    points = np.array([g.GetPoint(i) for i in range(g.GetNumberOfPoints())])
+    soa = vtkSOADataArrayTemplate["float64"]()
+    soa.SetNumberOfComponents(3)
+    soa.SetNumberOfTuples(len(points))
+    soa.SetName("soa")
+    for i, p in enumerate(points):
+        soa.SetTuple3(i, 7 * p[0], SLANT(p), -p[2])
+    g.GetPointData().SetScalars(soa)
+    f = colors(RAMP)
+    f.SetVectorModeToComponent()
+    f.SetVectorComponent(1)
+    _, _, m = expect(volume(g, WAVES, f))
+    assert m.GetNumberOfCopies() == 0, "one component of such an array needs no copy"
+
+
+def test_scalar_modes():
+    g = lattice(2)
+    points = np.array([g.GetPoint(i) for i in range(g.GetNumberOfPoints())])
+    add(g, SLANT(points), "slant")
+    add(g, np.arange(8) / 7.0, "cells", "cell")
+    v = volume(g, WAVES, RAMP)
+    m = v.GetMapper()
+    w, r = scene(v)
+    upward = truth(r, (64, 64), opacity=WAVES, color=RAMP)
+    slanted = truth(r, (64, 64), **BOX)
+    check(pixels(w), upward, what="default")
+    m.SetScalarModeToUsePointFieldData()
+    m.SelectScalarArray("slant")
+    check(pixels(w), slanted, what="by name")
+    m.SelectScalarArray(0)
+    check(pixels(w), upward, what="by id")
+    m.SelectScalarArray(1)
+    check(pixels(w), slanted, what="by another id")
+    m.SetScalarModeToUsePointData()
+    check(pixels(w), upward, what="point data")
+    # Bricks count along x, then y, then z.
+    number = lambda p: sum((p[..., k] > 0.5) * 2**k for k in range(3)) / 7.0
+    celled = truth(r, (64, 64), field=number, opacity=WAVES, color=RAMP, steps=2000)
+    m.SetScalarModeToUseCellData()
+    g.GetCellData().SetActiveScalars("cells")
+    check(pixels(w), celled, what="cell data")
+    m.SetScalarModeToUseCellFieldData()
+    m.SelectScalarArray("cells")
+    check(pixels(w), celled, what="cells by name")
+
+
+def vectors(g):
+    points = np.array([g.GetPoint(i) for i in range(g.GetNumberOfPoints())])
+    return points, SLANT(points)
+
+
+def test_components_and_magnitude():
+    g = lattice(2)
+    points, s = vectors(g)
+    direction = np.array([2, -1, 2]) / 3
+    add(g, s[:, None] * direction, "v")
+    g.GetPointData().SetActiveScalars("v")
+    f = colors(RAMP)
+    v = volume(g, WAVES, f)
+    w, r = scene(v)
+    f.SetVectorModeToMagnitude()
+    check(pixels(w), truth(r, (64, 64), **BOX), what="magnitude")
+    f.SetVectorModeToComponent()
+    f.SetVectorComponent(2)
+    check(pixels(w), truth(r, (64, 64), **{**BOX, "field": lambda p: SLANT(p) * 2 / 3}), what="component")
+
+
+def test_dependent_components():
+    g = lattice(2)
+    points, s = vectors(g)
+    add(g, np.stack([points[:, 0], s], -1), "pair")
+    g.GetPointData().SetActiveScalars("pair")
+    v = volume(g, WAVES, RAMP)
+    v.GetProperty().IndependentComponentsOff()
+    w, r = scene(v)
+    picture = pixels(w)
+    # The truth has one field for both, so opacity is checked by the alpha, and colour where it is one.
+    check(picture[..., 3:], truth(r, (64, 64), **BOX)[..., 3:], what="opacity")
+    v.GetProperty().SetColor(colors([(0, 1, 0, 0), (0.4999, 1, 0, 0), (0.5001, 0, 0, 1), (1, 0, 0, 1)]))
+    picture = pixels(w)
+    check(picture[..., 0] + picture[..., 2], picture[..., 3], near=2, what="colour")
+    assert picture[..., 0].max() > 100 and picture[..., 2].max() > 100
+
+
+def test_four_dependent_components():
+    # Red, green, blue and opacity themselves, as bytes or as floats from 0 to 1.
+    g = lattice(1)
+    n = g.GetNumberOfPoints()
+    for kind, one in ((np.uint8, 255), (np.float32, 1.0)):
+        a = np.tile(np.array([1.0, 0.4, 0.2, 0.6]) * one, (n, 1)).astype(kind)
+        g.GetPointData().Initialize()
+        add(g, a, "rgba")
+        v = volume(g)
+        v.GetProperty().IndependentComponentsOff()
+        w, r = scene(v, position=(0.5, 0.5, 6), up=(0, 1, 0), parallel=0.4)
+        alpha = 1 - np.exp(-0.6)
+        assert np.abs(pixels(w)[32, 32] - 255 * alpha * np.array([1, 0.4, 0.2, 1])).max() < NEAR, kind
+
+
+def test_three_dependent_components_are_an_error():
+    g = lattice(1)
+    add(g, np.ones((8, 3)), "three")
+    g.GetPointData().SetActiveScalars("three")
+    v = volume(g)
+    v.GetProperty().IndependentComponentsOff()
+    errors = Errors(v.GetMapper())
+    w, r = scene(v)
+    for _ in range(3):
+        assert pixels(w).max() == 0
+    assert len(errors) == 1, "an error is said once"
+    v.GetProperty().IndependentComponentsOn()
+    assert pixels(w).max() > 0, "and the volume is drawn once it can be"
+
+
+def test_grey_functions():
+    v = volume(lattice(2, field=SLANT), WAVES)
+    v.GetProperty().SetColor(opacities([(0, 0.1), (0.6, 1), (1, 0.3)]))
+    expect(v, color=[(0, 0.1, 0.1, 0.1), (0.6, 1, 1, 1), (1, 0.3, 0.3, 0.3)])
+
+
+def test_colour_spaces():
+    # What VTK says of each colour function at many places is the truth.
+    for space in ("RGB", "HSV", "HSVNoWrap", "Lab", "Diverging", "Step"):
+        try:
+            f = colors([(0, 0.1, 0.2, 0.9), (0.4, 0.9, 0.8, 0.2), (1, 0.8, 0.0, 0.1)], space)
+        except AttributeError:
+            continue
+        at = np.linspace(0, 1, 4001)
+        table = [(s, *f.GetColor(s)) for s in at]
+        expect(volume(lattice(2, field=SLANT), TENT, f), space, opacity=TENT, color=table)
+
+
+def test_midpoints_and_sharpness():
+    f = vtkCommonDataModel.vtkPiecewiseFunction()
+    f.AddPoint(0, 0, 0.3, 0.6)
+    f.AddPoint(0.5, 3, 0.7, 1.0)
+    f.AddPoint(1, 0.2, 0.5, 0)
+    at = np.linspace(0, 1, 8001)
+    expect(volume(lattice(2, field=SLANT), f, RAMP), opacity=[(s, f.GetValue(s)) for s in at])
+
+
+def test_functions_end_where_they_do_not_clamp():
+    f, c = opacities([(0.3, 1), (0.6, 2)]), colors([(0.3, 1, 0, 0), (0.6, 0, 1, 0)])
+    f.ClampingOff()
+    v = volume(lattice(2, field=SLANT), f, c)
+    expect(v, opacity=[(0.2999, 0), (0.3, 1), (0.6, 2), (0.6001, 0)], color=[(0.3, 1, 0, 0), (0.6, 0, 1, 0)], near=2)
+
+
+def test_unit_distance_and_convention():
+    for unit in (0.25, 3.0):
+        expect(volume(lattice(2, field=SLANT), WAVES, RAMP, unit), unit=unit)
+    low = [(0, 0.1), (0.5, 0.8), (1, 0.3)]
+    v = volume(lattice(2, field=SLANT), low, RAMP, 0.5)
+    v.GetMapper().SetOpacityConventionToOpacity()
+    expect(v, opacity=low, unit=0.5, slab=True)
+
+
+def test_values_that_are_not_finite_are_invisible():
+    g = half = lattice(1, cells="hex", low=(0, 0, 0), high=(1, 1, 1))
+    points = np.array([g.GetPoint(i) for i in range(8)] + [(x, y, 2.0) for y in (0, 1) for x in (0, 1)])
+    g = grid(points, [(VOXEL, range(8)), (VOXEL, range(4, 12))], np.array([*points[:8, 2], np.nan, 0, np.inf, 1]))
+    assert half
+    # Every tetrahedron of the upper brick that touches such a point is gone; the lower one is whole.
+    w, r = scene(volume(g, TENT), position=(0.5, 0.5, -5), focus=(0.5, 0.5, 0), up=(0, 1, 0), parallel=0.4, clip=(1, 6))
+    check(pixels(w), np.full((64, 64, 4), 161))
+
+
+def test_new_data():
+    g = lattice(2, field=SLANT)
+    v = volume(g, WAVES, RAMP)
+    w, r = scene(v)
+    pixels(w)
+    a = g.GetPointData().GetScalars()
+    points = np.array([g.GetPoint(i) for i in range(27)])
+    for i, p in enumerate(points):
+        a.SetValue(i, 1 - SLANT(p))
+    a.Modified()
+    check(pixels(w), truth(r, (64, 64), **{**BOX, "field": lambda p: 1 - SLANT(p)}), what="values in place")
+    for i, p in enumerate(points):
+        g.GetPoints().SetPoint(i, p[0], p[1], 0.6 * p[2])
+        a.SetValue(i, SLANT(points[i] * [1, 1, 0.6]))
+    g.GetPoints().Modified()
+    a.Modified()
+    check(pixels(w), truth(r, (64, 64), **{**BOX, "high": (1, 1, 0.6)}), what="points in place")
+    v.GetMapper().SetInputData(lattice(1, high=(0.5, 1, 1), field=SLANT))
+    check(pixels(w), truth(r, (64, 64), **{**BOX, "high": (0.5, 1, 1)}), what="another grid")
+
+
+def test_empty_grids_draw_nothing_and_are_no_error():
+    for g in (vtkCommonDataModel.vtkUnstructuredGrid(), grid(np.zeros((3, 3)), [], np.ones(3))):
+        v = volume(g)
+        errors = Errors(v.GetMapper())
+        w, r = scene(v, clip=(1, 5))
+        assert pixels(w).max() == 0 and len(errors) == 0
+
+
+def test_errors_leave_the_application_alive():
+    cases = dict(array=lambda m: (m.SetScalarModeToUsePointFieldData(), m.SelectScalarArray("nowhere")),
+                 device=lambda m: m.SetDevice("no such thing"), engine=lambda m: m.SetEngine("magic"),
+                 integral=lambda m: m.SetIntegral("guess"))
+    for name, spoil in cases.items():
+        v = volume(lattice(2, field=SLANT), WAVES, RAMP)
+        spoil(v.GetMapper())
+        errors = Errors(v.GetMapper())
+        w, r = scene(v)
+        assert pixels(w).max() == 0 and pixels(w).max() == 0 and len(errors) == 1, name
+        v.GetMapper().SetScalarModeToDefault()
+        for setting in ("Device", "Engine", "Integral"):
+            getattr(v.GetMapper(), "Set" + setting)("auto")
+        check(pixels(w), truth(r, (64, 64), **BOX), what=name)
+
+
+def test_what_is_not_honoured_is_said_once():
+    v = volume(lattice(2, field=SLANT), WAVES, RAMP)
+    v.GetProperty().ShadeOn()
+    errors = Errors(v.GetMapper())
+    w, r = scene(v)
+    for k in range(3):
+        r.GetActiveCamera().Azimuth(1)
+        w.Render()
+    assert len(errors) == 1
+
+
+if __name__ == "__main__":
+    main(globals())

@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Cameras, viewports and windows of every kind."""
+import numpy as np
+from scene import *  # noqa: F403
+from test_pictures import RAMP, SLANT, WAVES
+
+BOX = dict(field=SLANT, opacity=WAVES, color=RAMP)
+
+
+def box(**settings):
+    return volume(lattice(2, field=SLANT), WAVES, RAMP, **settings)
+
+
+def test_window_centre_and_shear():
+    w, r = scene(box())
+    c = r.GetActiveCamera()
+    c.SetWindowCenter(0.3, -0.2)
+    check(pixels(w), truth(r, (64, 64), **BOX), what="window centre")
+    c.SetWindowCenter(0, 0)
+    c.SetViewShear(0.15, 0.1, 1.0)
+    check(pixels(w), truth(r, (64, 64), **BOX), what="shear")
+    c.ParallelProjectionOn()
+    c.SetParallelScale(1)
+    check(pixels(w), truth(r, (64, 64), **BOX), what="parallel and sheared")
+
+
+def test_off_axis():
+    w, r = scene(box(), position=(0.5, 0.5, 4), up=(0, 1, 0), clip=(1, 8))
+    c = r.GetActiveCamera()
+    c.UseOffAxisProjectionOn()
+    c.SetScreenBottomLeft(-0.5, -0.3, 1.5)
+    c.SetScreenBottomRight(1.6, -0.3, 1.3)
+    c.SetScreenTopRight(1.6, 1.4, 1.3)
+    c.SetEyeSeparation(0.4)
+    check(pixels(w), truth(r, (64, 64), **BOX))
+
+
+def test_explicit_projection():
+    w, r = scene(box(), clip=(1, 8))
+    m = np.array([[2.5, 0, 0.2, 0], [0, 3, -0.1, 0], [0, 0, -9 / 7, -16 / 7], [0, 0, -1, 0]])
+    c = r.GetActiveCamera()
+    c.SetExplicitProjectionTransformMatrix(transform(m))
+    c.UseExplicitProjectionTransformMatrixOn()
+    check(pixels(w), truth(r, (64, 64), **BOX))
+
+
+def test_model_transform_of_the_camera():
+    w, r = scene(box(), clip=(0.5, 12))
+    m = np.diag([1.3, 0.8, 1, 1])
+    m[0, 3] = 0.2
+    r.GetActiveCamera().SetModelTransformMatrix(transform(m))
+    # It moves the world before the eye sees it: lengths are those of the world as it was.
+    check(pixels(w), truth(r, (64, 64), **BOX))
+
+
+def test_stereo():
+    w = window()
+    w.StereoCapableWindowOn()
+    r = renderer(w, box())
+    c = look(r)
+    w.SetStereoTypeToLeft()
+    w.StereoRenderOn()
+    left = pixels(w)
+    w.SetStereoTypeToRight()
+    right = pixels(w)
+    assert np.abs(left - right).max() > 20, "the eyes see the same"
+    c.SetEyeAngle(0)
+    both = pixels(w)
+    w.StereoRenderOff()
+    check(both, pixels(w), near=0)
+
+
+def test_red_blue_stereo():
+    w, r = scene(box())
+    c = r.GetActiveCamera()
+    w.SetStereoTypeToLeft()
+    w.StereoRenderOn()
+    left = pixels(w)
+    w.SetStereoTypeToRight()
+    right = pixels(w)
+    w.SetStereoTypeToAnaglyph()
+    w.SetAnaglyphColorSaturation(0)
+    w.SetAnaglyphColorMask(4, 3)
+    mixed = pixels(w)
+    grey = lambda p: p[..., :3] @ np.array([0.3086, 0.6094, 0.0820])
+    assert np.abs(mixed[..., 0] - grey(left)).max() < 4 and np.abs(mixed[..., 2] - grey(right)).max() < 4
+
+
+def test_tiles():
+    # A picture of two by two tiles is that of one large window.
+    from vtkmodules.vtkRenderingCore import vtkWindowToImageFilter
+    w, r = scene(box())
+    grab = vtkWindowToImageFilter()
+    grab.SetInput(w)
+    grab.SetScale(2)
+    grab.SetInputBufferTypeToRGB()
+    grab.ReadFrontBufferOff()
+    grab.Update()
+    got = numpy_support.vtk_to_numpy(grab.GetOutput().GetPointData().GetScalars()).reshape(128, 128, 3).astype(int)
+    check(got, truth(r, (128, 128), **BOX)[..., :3])
+
+
+def test_sizes():
+    w, r = scene(box(), size=(90, 40))
+    for size in ((90, 40), (33, 70), (1, 1), (64, 64)):
+        w.SetSize(*size)
+        picture = pixels(w)
+        if size != (1, 1):
+            check(picture, truth(r, size, **BOX), what=str(size))
+
+
+def test_several_windows_on_one_mapper():
+    v = box()
+    made = [scene(v, position=p) for p in ((2.1, -1.7, 2.9), (-2, -3, 1), (0.5, 4, 0.2))]
+    for _ in range(2):
+        for i, (w, r) in enumerate(made):
+            check(pixels(w), truth(r, (64, 64), **BOX), what=f"window {i}")
+    m = v.GetMapper()
+    assert m.GetNumberOfFrames() == 3 and m.GetNumberOfMeshUploads() == 1, "still windows are drawn once"
+    # A window may go while the others stay.
+    made.pop(0)[0].Finalize()
+    for w, r in made:
+        check(pixels(w), truth(r, (64, 64), **BOX))
+
+
+def test_several_volumes_on_one_mapper():
+    a, b = box(), volume(lattice(2, field=SLANT), [(0, 0.4)])
+    b.SetMapper(a.GetMapper())
+    b.SetPosition(0, 0, 2)
+    w, r = scene(a, b, position=(4, -5, 6), clip=(1, 20))
+    first = pixels(w)
+    frames = a.GetMapper().GetNumberOfFrames()
+    check(pixels(w), first, near=0)
+    assert a.GetMapper().GetNumberOfFrames() == frames == 2
+
+
+def test_viewports_side_by_side_and_on_top():
+    v = box()
+    w = window((120, 60))
+    rs = [renderer(w, v, viewport=(k / 2, 0, (k + 1) / 2, 1)) for k in range(2)]
+    look(rs[0])
+    look(rs[1], position=(-2, 3, 1))
+    w.SetNumberOfLayers(2)
+    top = renderer(w, plane(0.5, (1, 0, 0)), viewport=(0, 0, 0.1, 0.1))
+    top.SetLayer(1)
+    look(top, position=(0, 0, 5), up=(0, 1, 0))
+    picture = pixels(w)
+    check(picture[8:, :60], truth(rs[0], (60, 60), **BOX)[8:], what="left")
+    check(picture[:, 60:], truth(rs[1], (60, 60), **BOX), what="right")
+    assert list(picture[2, 4, :3]) == [255, 0, 0]
+
+
+def test_multisampled_windows():
+    for samples in (0, 4, 8):
+        w, r = scene(box(), plane(-0.3, (0.2, 0.4, 0.6)), samples=samples, position=(0.5, 0.5, 5), up=(0, 1, 0))
+        over = truth(r, (64, 64), **BOX)
+        check(pixels(w), over + (1 - over[..., 3:] / 255) * np.array([51, 102, 153, 255]), what=f"{samples} samples")
+
+
+def test_off_screen_and_back():
+    w, r = scene(box())
+    for off in (1, 0, 1):
+        w.SetOffScreenRendering(off)
+        check(pixels(w), truth(r, (64, 64), **BOX))
+
+
+def test_picking_draws_nothing():
+    from vtkmodules.vtkRenderingCore import vtkHardwareSelector
+    w, r = scene(box())
+    before = pixels(w)
+    s = vtkHardwareSelector()
+    s.SetRenderer(r)
+    s.SetArea(0, 0, 63, 63)
+    assert s.Select().GetNumberOfNodes() == 0
+    check(pixels(w), before, near=0)
+
+
+def test_image_sample_distance():
+    v = box(ImageSampleDistance=2.0)
+    w, r = scene(v, size=(96, 96))
+    picture, expected = pixels(w), truth(r, (96, 96), **BOX)
+    assert np.abs(picture - expected).mean() < 4, np.abs(picture - expected).mean()
+    v.GetMapper().SetImageSampleDistance(1)
+    check(pixels(w), expected)
+
+
+if __name__ == "__main__":
+    main(globals())

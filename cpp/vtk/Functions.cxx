@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+#include "Functions.h"
+
+#include "vtkColorTransferFunction.h"
+#include "vtkPiecewiseFunction.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace
+{
+
+const double Tolerance = 1e-4;
+
+// Halvings of an interval between two nodes, after which what is left is as good as a step.
+const int MostHalvings = 16;
+
+using Value = std::array<double, 3>;
+
+struct Knot
+{
+  double s;
+  Value value;
+};
+
+double Distance(const Value& a, const Value& b)
+{
+  return std::max({ std::abs(a[0] - b[0]), std::abs(a[1] - b[1]), std::abs(a[2] - b[2]) });
+}
+
+Value Mix(const Value& a, const Value& b, double u)
+{
+  return { a[0] + (b[0] - a[0]) * u, a[1] + (b[1] - a[1]) * u, a[2] + (b[2] - a[2]) * u };
+}
+
+template <class F>
+void Refine(const F& f, const Knot& a, const Knot& b, int halvings, std::vector<Knot>& knots)
+{
+  bool straight = true;
+  // At no simple fractions of each other, so that what repeats is not missed.
+  for (double u : { 0.5, 0.23, 0.81 })
+  {
+    straight = straight && Distance(f(a.s + (b.s - a.s) * u), Mix(a.value, b.value, u)) < Tolerance;
+  }
+  if (straight || halvings == 0)
+  {
+    knots.push_back(b);
+    return;
+  }
+  const double s = a.s + (b.s - a.s) / 2;
+  const Knot middle{ s, f(s) };
+  Refine(f, a, middle, halvings - 1, knots);
+  Refine(f, middle, b, halvings - 1, knots);
+}
+
+// The knots of a function with nodes at `nodes`, ascending.
+template <class F>
+std::vector<Knot> Sample(const F& raw, std::vector<double> nodes)
+{
+  auto f = [&](double s) {
+    Value v = raw(s);
+    for (double& x : v)
+    {
+      x = std::isfinite(x) ? std::max(x, 0.0) : 0.0;
+    }
+    return v;
+  };
+  nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+  if (nodes.empty())
+  {
+    return { { 0, { 0, 0, 0 } } };
+  }
+  const double infinity = std::numeric_limits<double>::infinity();
+  const double first = nodes.front(), last = nodes.back();
+  std::vector<Knot> knots;
+  auto add = [&](double s, const Value& v) {
+    if (knots.empty() || knots.back().s != s || Distance(knots.back().value, v) > 0)
+    {
+      knots.push_back({ s, v });
+    }
+  };
+  add(first, f(std::nextafter(first, -infinity)));
+  add(first, f(first));
+  for (std::size_t i = 0; i + 1 < nodes.size(); ++i)
+  {
+    // A function may jump at its nodes.
+    const double s = nodes[i], end = nodes[i + 1];
+    const Knot a{ s, f(std::nextafter(s, infinity)) }, b{ end, f(std::nextafter(end, -infinity)) };
+    if (Distance(a.value, knots.back().value) > Tolerance)
+    {
+      knots.push_back(a);
+    }
+    Refine(f, knots.back(), b, MostHalvings, knots);
+    if (Distance(f(end), b.value) > Tolerance)
+    {
+      knots.push_back({ end, f(end) });
+    }
+  }
+  // The last node itself belongs to the function, also where the scalar is known to 32 bits only.
+  const double beyond = last + 1e-6 * std::max({ last - first, std::abs(last) * 1e-3, 1e-30 });
+  const Value after = f(beyond);
+  if (Distance(after, knots.back().value) > Tolerance)
+  {
+    add(beyond, knots.back().value);
+    add(beyond, after);
+  }
+  // What lies between two equal values says nothing.
+  std::vector<Knot> kept;
+  for (std::size_t i = 0; i < knots.size(); ++i)
+  {
+    const bool idle = i > 0 && i + 1 < knots.size() && Distance(kept.back().value, knots[i].value) == 0 &&
+      Distance(knots[i].value, knots[i + 1].value) == 0;
+    if (!idle)
+    {
+      kept.push_back(knots[i]);
+    }
+  }
+  return kept;
+}
+
+std::vector<Knot> Sample(vtkPiecewiseFunction* function)
+{
+  std::vector<double> nodes;
+  for (int i = 0; i < function->GetSize(); ++i)
+  {
+    double node[4];
+    function->GetNodeValue(i, node);
+    nodes.push_back(node[0]);
+  }
+  return Sample(
+    [&](double s) -> Value {
+      const double v = function->GetValue(s);
+      return { v, v, v };
+    },
+    nodes);
+}
+
+}
+
+namespace Functions
+{
+
+Color KnotsOf(vtkColorTransferFunction* function)
+{
+  std::vector<double> nodes;
+  for (int i = 0; i < function->GetSize(); ++i)
+  {
+    double node[6];
+    function->GetNodeValue(i, node);
+    nodes.push_back(node[0]);
+  }
+  Color color;
+  auto evaluate = [&](double s) -> Value {
+    Value v;
+    function->GetColor(s, v.data());
+    return v;
+  };
+  for (const Knot& k : Sample(evaluate, nodes))
+  {
+    color.push_back({ k.s, k.value });
+  }
+  return color;
+}
+
+Color GreyKnotsOf(vtkPiecewiseFunction* function)
+{
+  Color color;
+  for (const Knot& k : Sample(function))
+  {
+    color.push_back({ k.s, k.value });
+  }
+  return color;
+}
+
+Opacity KnotsOf(vtkPiecewiseFunction* function)
+{
+  Opacity opacity;
+  for (const Knot& k : Sample(function))
+  {
+    opacity.push_back({ k.s, k.value[0] });
+  }
+  return opacity;
+}
+
+}

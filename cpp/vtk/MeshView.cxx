@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+#include "MeshView.h"
+
+#include "vtkHaliteCompatibility.h"
+
+#include "vtkCellArray.h"
+#include "vtkCellData.h"
+#include "vtkDataArray.h"
+#include "vtkDataSetAttributes.h"
+#include "vtkDoubleArray.h"
+#include "vtkIdList.h"
+#include "vtkPointData.h"
+#include "vtkPoints.h"
+#include "vtkSOADataArrayTemplate.h"
+#include "vtkTypeInt64Array.h"
+#include "vtkUnsignedCharArray.h"
+#include "vtkUnstructuredGrid.h"
+#include "vtkUnstructuredGridBase.h"
+
+namespace
+{
+
+// False for what is no number of 8, 16, 32 or 64 bits.
+bool TypeOf(int vtkType, halite::Type& type)
+{
+  const bool isLong64 = sizeof(long) == 8;
+  switch (vtkType)
+  {
+    case VTK_CHAR:
+      type = std::is_signed<char>::value ? halite::Type::Int8 : halite::Type::UInt8;
+      return true;
+    case VTK_SIGNED_CHAR:
+      type = halite::Type::Int8;
+      return true;
+    case VTK_UNSIGNED_CHAR:
+      type = halite::Type::UInt8;
+      return true;
+    case VTK_SHORT:
+      type = halite::Type::Int16;
+      return true;
+    case VTK_UNSIGNED_SHORT:
+      type = halite::Type::UInt16;
+      return true;
+    case VTK_INT:
+      type = halite::Type::Int32;
+      return true;
+    case VTK_UNSIGNED_INT:
+      type = halite::Type::UInt32;
+      return true;
+    case VTK_LONG:
+      type = isLong64 ? halite::Type::Int64 : halite::Type::Int32;
+      return true;
+    case VTK_UNSIGNED_LONG:
+      type = isLong64 ? halite::Type::UInt64 : halite::Type::UInt32;
+      return true;
+    case VTK_LONG_LONG:
+      type = halite::Type::Int64;
+      return true;
+    case VTK_UNSIGNED_LONG_LONG:
+      type = halite::Type::UInt64;
+      return true;
+    case VTK_ID_TYPE:
+      type = sizeof(vtkIdType) == 8 ? halite::Type::Int64 : halite::Type::Int32;
+      return true;
+    case VTK_FLOAT:
+      type = halite::Type::Float32;
+      return true;
+    case VTK_DOUBLE:
+      type = halite::Type::Float64;
+      return true;
+    default:
+      return false;
+  }
+}
+
+// Where one component of an array of structure-of-arrays layout lies; null if the array is none.
+const void* ComponentOf(vtkDataArray* array, int component)
+{
+  switch (array->GetDataType())
+  {
+    vtkTemplateMacro(
+      if (auto soa = vtkSOADataArrayTemplate<VTK_TT>::FastDownCast(array))
+      {
+        return soa->GetComponentArrayPointer(component);
+      });
+    default:
+      break;
+  }
+  return nullptr;
+}
+
+std::uint64_t Time(vtkObject* object)
+{
+  return object ? static_cast<std::uint64_t>(object->GetMTime()) : 0;
+}
+
+vtkDataArray* Ghosts(vtkDataSetAttributes* attributes)
+{
+  return attributes->GetArray(vtkDataSetAttributes::GhostArrayName());
+}
+
+}
+
+halite::Numbers MeshView::Numbers(vtkDataArray* array, int component)
+{
+  halite::Type type = halite::Type::Float64;
+  const bool known = TypeOf(array->GetDataType(), type);
+  const std::size_t tuples = static_cast<std::size_t>(array->GetNumberOfTuples());
+  const std::size_t components = static_cast<std::size_t>(array->GetNumberOfComponents());
+  if (known && array->HasStandardMemoryLayout())
+  {
+    return { array->GetVoidPointer(0), tuples * components, type };
+  }
+  const int only = components == 1 ? 0 : component;
+  if (known && only >= 0 && tuples > 0)
+  {
+    if (const void* data = ComponentOf(array, only))
+    {
+      return { data, tuples, type };
+    }
+  }
+  auto copy = vtkSmartPointer<vtkDataArray>::Take(
+    vtkDataArray::CreateDataArray(known ? array->GetDataType() : VTK_DOUBLE));
+  if (component >= 0 && components > 1)
+  {
+    copy->SetNumberOfTuples(array->GetNumberOfTuples());
+    copy->CopyComponent(0, array, component);
+  }
+  else
+  {
+    copy->DeepCopy(array);
+  }
+  this->Kept.push_back(copy);
+  ++this->Copies;
+  return { copy->GetVoidPointer(0), static_cast<std::size_t>(copy->GetNumberOfValues()), type };
+}
+
+halite::Numbers MeshView::Points(vtkUnstructuredGridBase* grid)
+{
+  if (auto sets = vtkPointSet::SafeDownCast(grid))
+  {
+    return sets->GetPoints() ? this->Numbers(sets->GetPoints()->GetData()) : halite::Numbers();
+  }
+  auto points = vtkSmartPointer<vtkDoubleArray>::New();
+  points->SetNumberOfComponents(3);
+  points->SetNumberOfTuples(grid->GetNumberOfPoints());
+  for (vtkIdType i = 0; i < grid->GetNumberOfPoints(); ++i)
+  {
+    points->SetTuple(i, grid->GetPoint(i));
+  }
+  ++this->Copies;
+  this->Kept.push_back(points);
+  return this->Numbers(points);
+}
+
+halite::Mesh MeshView::Mesh(vtkUnstructuredGridBase* base)
+{
+  static const std::vector<std::int64_t> zero{ 0 };
+  halite::Numbers types(nullptr, 0, halite::Type::UInt8), offsets = zero, connectivity(nullptr, 0, halite::Type::Int64);
+  if (auto grid = vtkUnstructuredGrid::SafeDownCast(base))
+  {
+    vtkCellArray* cells = grid->GetCells();
+    vtkDataArray* cellTypes = vtkHaliteCompatibility::GetCellTypes(grid);
+    if (cells && cellTypes && cells->GetNumberOfCells() > 0)
+    {
+      types = this->Numbers(cellTypes);
+      offsets = this->Numbers(cells->GetOffsetsArray());
+      connectivity = this->Numbers(cells->GetConnectivityArray());
+    }
+  }
+  else
+  {
+    auto t = vtkSmartPointer<vtkUnsignedCharArray>::New();
+    auto o = vtkSmartPointer<vtkTypeInt64Array>::New(), c = vtkSmartPointer<vtkTypeInt64Array>::New();
+    auto ids = vtkSmartPointer<vtkIdList>::New();
+    o->InsertNextValue(0);
+    for (vtkIdType i = 0; i < base->GetNumberOfCells(); ++i)
+    {
+      t->InsertNextValue(static_cast<unsigned char>(base->GetCellType(i)));
+      base->GetCellPoints(i, ids);
+      for (vtkIdType k = 0; k < ids->GetNumberOfIds(); ++k)
+      {
+        c->InsertNextValue(ids->GetId(k));
+      }
+      o->InsertNextValue(c->GetNumberOfValues());
+    }
+    this->Kept.insert(this->Kept.end(), { t, o, c });
+    this->Copies += 3;
+    types = this->Numbers(t);
+    offsets = this->Numbers(o);
+    connectivity = this->Numbers(c);
+  }
+  halite::Mesh mesh(this->Points(base), types, offsets, connectivity);
+  const std::string name = vtkDataSetAttributes::GhostArrayName();
+  if (vtkDataArray* ghosts = Ghosts(base->GetPointData()))
+  {
+    mesh.addArray(name, halite::Association::Points, 1, this->Numbers(ghosts));
+  }
+  if (vtkDataArray* ghosts = Ghosts(base->GetCellData()))
+  {
+    mesh.addArray(name, halite::Association::Cells, 1, this->Numbers(ghosts));
+  }
+  return mesh;
+}
+
+std::vector<std::uint64_t> MeshView::Identity(vtkUnstructuredGridBase* base)
+{
+  auto grid = vtkUnstructuredGrid::SafeDownCast(base);
+  if (!grid)
+  {
+    return { Time(base) };
+  }
+  vtkCellArray* cells = grid->GetCells();
+  vtkPoints* points = grid->GetPoints();
+  return { Time(points), Time(points ? points->GetData() : nullptr), Time(cells), Time(vtkHaliteCompatibility::GetCellTypes(grid)),
+    Time(Ghosts(grid->GetPointData())), Time(Ghosts(grid->GetCellData())),
+    static_cast<std::uint64_t>(grid->GetNumberOfPoints()), static_cast<std::uint64_t>(grid->GetNumberOfCells()) };
+}

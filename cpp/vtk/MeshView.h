@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+// VTK's arrays as the core reads them: in place where their layout allows it.
+#pragma once
+
+#include "halite.h"
+
+#include "vtkSmartPointer.h"
+
+#include <cstdint>
+#include <vector>
+
+class vtkDataArray;
+class vtkPoints;
+class vtkUnstructuredGridBase;
+
+class MeshView
+{
+public:
+  // Numbers of all components of an array, or of one. A copy, if one must be made, lives as long as this view.
+  halite::Numbers Numbers(vtkDataArray* array, int component = -1);
+
+  // The grid's points and cells, and what is left out of it.
+  halite::Mesh Mesh(vtkUnstructuredGridBase* grid);
+
+  halite::Numbers Points(vtkUnstructuredGridBase* grid);
+
+  // What the mesh of a grid depends on: equal if nothing changed.
+  static std::vector<std::uint64_t> Identity(vtkUnstructuredGridBase* grid);
+
+  int GetCopies() const { return this->Copies; }
+
+private:
+  std::vector<vtkSmartPointer<vtkDataArray>> Kept;
+  int Copies = 0;
+};

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+// Between a window's frame buffer and pictures in memory.
+#pragma once
+
+#include "vtkSmartPointer.h"
+#include "vtkWeakPointer.h"
+
+#include <memory>
+#include <vector>
+
+class vtkOpenGLQuadHelper;
+class vtkOpenGLRenderWindow;
+class vtkRenderer;
+class vtkTextureObject;
+class vtkWindow;
+
+// The part of a window that a renderer draws to, in pixels from its lower left corner.
+struct Viewport
+{
+  int X = 0, Y = 0, Width = 0, Height = 0;
+};
+
+// What one window keeps to show pictures.
+class Presenter
+{
+public:
+  explicit Presenter(vtkOpenGLRenderWindow* window);
+  ~Presenter();
+
+  vtkOpenGLRenderWindow* GetWindow() const;
+
+  // The depths of what is drawn in the viewport, row 0 lowest; `across` x `down` of them, at the middles of as many fields.
+  static void ReadDepths(
+    vtkOpenGLRenderWindow* window, const Viewport& viewport, int across, int down, std::vector<float>& depths);
+
+  // A texture of premultiplied RGBA, row 0 lowest.
+  vtkSmartPointer<vtkTextureObject> Upload(int width, int height, const std::vector<float>& pixels);
+
+  // Draws a texture over what is in the viewport: colour + (1 - opacity) x what is there, opacity likewise.
+  void Present(vtkTextureObject* texture, const Viewport& viewport);
+
+private:
+  vtkWeakPointer<vtkOpenGLRenderWindow> Window;
+  std::unique_ptr<vtkOpenGLQuadHelper> Quad;
+};

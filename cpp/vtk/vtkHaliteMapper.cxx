@@ -1,0 +1,644 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+#include "vtkHaliteMapper.h"
+
+#include "Functions.h"
+#include "MeshView.h"
+#include "Presenter.h"
+#include "vtkHaliteCompatibility.h"
+
+#include "vtkCamera.h"
+#include "vtkCellData.h"
+#include "vtkColorTransferFunction.h"
+#include "vtkCommand.h"
+#include "vtkDataArray.h"
+#include "vtkLogger.h"
+#include "vtkMatrix3x3.h"
+#include "vtkMatrix4x4.h"
+#include "vtkNew.h"
+#include "vtkObjectFactory.h"
+#include "vtkOpenGLCamera.h"
+#include "vtkOpenGLRenderWindow.h"
+#include "vtkPiecewiseFunction.h"
+#include "vtkPlane.h"
+#include "vtkPlaneCollection.h"
+#include "vtkPointData.h"
+#include "vtkRenderer.h"
+#include "vtkTextureObject.h"
+#include "vtkUnstructuredGridBase.h"
+#include "vtkVolume.h"
+#include "vtkVolumeProperty.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <list>
+#include <map>
+#include <mutex>
+#include <set>
+
+VTK_ABI_NAMESPACE_BEGIN
+
+namespace
+{
+
+using Matrix = std::array<double, 16>;
+
+// The rows of a matrix of VTK's.
+Matrix RowsOf(vtkMatrix4x4* m)
+{
+  Matrix rows;
+  std::copy(&m->Element[0][0], &m->Element[0][0] + 16, rows.begin());
+  return rows;
+}
+
+// What a frame depends on, in order; two that are equal have equal pictures.
+class Key
+{
+public:
+  Key& operator<<(double v)
+  {
+    std::uint64_t bits;
+    std::memcpy(&bits, &v, sizeof bits);
+    return *this << bits;
+  }
+  Key& operator<<(std::uint64_t v)
+  {
+    this->Words.push_back(v);
+    return *this;
+  }
+  Key& operator<<(const Key& other)
+  {
+    this->Words.insert(this->Words.end(), other.Words.begin(), other.Words.end());
+    return *this;
+  }
+  Key& operator<<(const std::vector<std::uint64_t>& words)
+  {
+    this->Words.insert(this->Words.end(), words.begin(), words.end());
+    return *this;
+  }
+  template <std::size_t N>
+  Key& operator<<(const std::array<double, N>& values)
+  {
+    for (double v : values)
+    {
+      *this << v;
+    }
+    return *this;
+  }
+  Key& operator<<(const std::string& s)
+  {
+    *this << static_cast<std::uint64_t>(s.size());
+    for (unsigned char c : s)
+    {
+      *this << static_cast<std::uint64_t>(c);
+    }
+    return *this;
+  }
+  bool operator==(const Key& other) const { return this->Words == other.Words; }
+  bool operator!=(const Key& other) const { return this->Words != other.Words; }
+
+private:
+  std::vector<std::uint64_t> Words;
+};
+
+std::string Text(const char* s)
+{
+  return s ? s : "";
+}
+
+// The core's log goes where VTK's does.
+void ForwardLog()
+{
+  static std::once_flag once;
+  std::call_once(once, [] {
+    halite::setLog([](halite::Level level, const std::string& line) {
+      if (level == halite::Level::Info)
+      {
+        vtkLog(TRACE, << "Halite: " << line);
+      }
+      else
+      {
+        vtkGenericWarningMacro("Halite: " << line);
+      }
+    });
+  });
+}
+
+double Now()
+{
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+// Measures its own life, in seconds.
+class Clock
+{
+public:
+  explicit Clock(double& seconds)
+    : Seconds(seconds)
+    , Start(Now())
+  {
+  }
+  ~Clock() { this->Seconds += Now() - this->Start; }
+
+private:
+  double& Seconds;
+  double Start;
+};
+
+// What is drawn of a grid, by which functions.
+struct Content
+{
+  vtkUnstructuredGridBase* Grid = nullptr;
+  vtkDataArray* Array = nullptr;
+  halite::Association Association = halite::Association::Points;
+  int Component = 0;
+  Matrix Placement{};
+  halite::TransferFunction Function;
+  Key SettingsKey, MeshKey, PlacementKey, FieldKey, FunctionKey;
+};
+
+// The knots of a property's functions, kept until one of them changes.
+struct Knots
+{
+  Key Sources;
+  Functions::Color Color;
+  Functions::Opacity Opacity;
+};
+
+// A picture that was drawn for a renderer, a volume and an eye.
+struct Frame
+{
+  vtkWeakPointer<vtkRenderer> Renderer;
+  vtkWeakPointer<vtkVolume> Volume;
+  int Eye = 0;
+  Key Pictured;
+  std::vector<float> Depths;
+  vtkSmartPointer<vtkTextureObject> Texture;
+};
+
+}
+
+struct vtkHaliteMapper::Internals
+{
+  std::unique_ptr<halite::Renderer> Renderer;
+  // What the renderer holds.
+  Key SettingsKey, MeshKey, PlacementKey, FieldKey, FunctionKey;
+  std::map<vtkVolumeProperty*, Knots> Functions;
+  std::list<Frame> Frames;
+  std::list<Presenter> Presenters;
+  // What failed, and for what: nothing is tried, or said, twice.
+  Key Failed;
+  std::set<std::string> Said;
+  std::vector<float> Pixels;
+  std::string Adapter;
+
+  Presenter& PresenterOf(vtkOpenGLRenderWindow* window)
+  {
+    for (Presenter& p : this->Presenters)
+    {
+      if (p.GetWindow() == window)
+      {
+        return p;
+      }
+    }
+    this->Presenters.emplace_back(window);
+    return this->Presenters.back();
+  }
+
+  Frame& FrameOf(vtkRenderer* renderer, vtkVolume* volume, int eye)
+  {
+    this->Frames.remove_if([](const Frame& f) { return !f.Renderer || !f.Volume; });
+    for (Frame& f : this->Frames)
+    {
+      if (f.Renderer == renderer && f.Volume == volume && f.Eye == eye)
+      {
+        return f;
+      }
+    }
+    this->Frames.emplace_back();
+    Frame& f = this->Frames.back();
+    f.Renderer = renderer;
+    f.Volume = volume;
+    f.Eye = eye;
+    return f;
+  }
+
+  // What is to be drawn now.
+  void Choose(vtkHaliteMapper& self, Content& content, vtkVolume* volume);
+
+  // Hands to the core what it does not hold yet.
+  void Prepare(vtkHaliteMapper& self, const Content& content);
+
+  const Knots& KnotsOf(vtkVolumeProperty* property, bool rgba)
+  {
+    const bool grey = property->GetColorChannels() == 1;
+    vtkPiecewiseFunction* opacity = property->GetScalarOpacity(0);
+    vtkPiecewiseFunction* greys = grey ? property->GetGrayTransferFunction(0) : nullptr;
+    vtkColorTransferFunction* colors = grey ? nullptr : property->GetRGBTransferFunction(0);
+    Key sources;
+    sources << static_cast<std::uint64_t>(opacity->GetMTime())
+            << static_cast<std::uint64_t>(grey ? greys->GetMTime() : colors->GetMTime())
+            << static_cast<std::uint64_t>(rgba);
+    Knots& knots = this->Functions[property];
+    if (knots.Sources != sources)
+    {
+      knots.Sources = sources;
+      if (rgba)
+      {
+        // The colours are in the array.
+        knots.Color = { { 0, { 1, 1, 1 } } };
+        knots.Opacity.clear();
+      }
+      else
+      {
+        knots.Color = grey ? ::Functions::GreyKnotsOf(greys) : ::Functions::KnotsOf(colors);
+        knots.Opacity = ::Functions::KnotsOf(opacity);
+      }
+    }
+    return knots;
+  }
+};
+
+vtkStandardNewMacro(vtkHaliteMapper);
+
+vtkHaliteMapper::vtkHaliteMapper()
+  : Inner(new Internals)
+{
+  this->SetDevice("auto");
+  this->SetEngine("auto");
+  this->SetIntegral("auto");
+}
+
+vtkHaliteMapper::~vtkHaliteMapper()
+{
+  this->SetDevice(nullptr);
+  this->SetEngine(nullptr);
+  this->SetIntegral(nullptr);
+}
+
+bool vtkHaliteMapper::IsSupported(vtkRenderWindow* window)
+{
+  return vtkOpenGLRenderWindow::SafeDownCast(window) != nullptr;
+}
+
+void vtkHaliteMapper::PrintSelf(ostream& os, vtkIndent indent)
+{
+  this->Superclass::PrintSelf(os, indent);
+  os << indent << "Device: " << Text(this->Device) << "\n";
+  os << indent << "Engine: " << Text(this->Engine) << "\n";
+  os << indent << "Integral: " << Text(this->Integral) << "\n";
+  os << indent << "OpacityConvention: " << (this->OpacityConvention == OPACITY ? "Opacity" : "Extinction") << "\n";
+  os << indent << "ImageSampleDistance: " << this->ImageSampleDistance << "\n";
+  os << indent << "NumberOfThreads: " << this->NumberOfThreads << "\n";
+  os << indent << "UseFloatingPointFrameBuffer: " << (this->UseFloatingPointFrameBuffer ? "On" : "Off") << "\n";
+  os << indent << "PrepareTime: " << this->PrepareTime << "\n";
+  os << indent << "DepthTime: " << this->DepthTime << "\n";
+  os << indent << "CoreTime: " << this->CoreTime << "\n";
+  os << indent << "PresentTime: " << this->PresentTime << "\n";
+  os << indent << "NumberOfFrames: " << this->NumberOfFrames << "\n";
+  os << indent << "NumberOfMeshUploads: " << this->NumberOfMeshUploads << "\n";
+  os << indent << "NumberOfPointUploads: " << this->NumberOfPointUploads << "\n";
+  os << indent << "NumberOfFieldUploads: " << this->NumberOfFieldUploads << "\n";
+  os << indent << "NumberOfFunctionUploads: " << this->NumberOfFunctionUploads << "\n";
+  os << indent << "NumberOfCopies: " << this->NumberOfCopies << "\n";
+}
+
+void vtkHaliteMapper::ReleaseGraphicsResources(vtkWindow* window)
+{
+  // Where a renderer comes to a window VTK releases what is of no window: that is nothing of ours.
+  this->Inner->Frames.remove_if([&](const Frame& f) { return !f.Renderer || f.Renderer->GetVTKWindow() == window; });
+  this->Inner->Presenters.remove_if([&](const Presenter& p) { return !p.GetWindow() || p.GetWindow() == window; });
+  this->Superclass::ReleaseGraphicsResources(window);
+}
+
+const char* vtkHaliteMapper::GetAdapter()
+{
+  this->Inner->Adapter = this->Inner->Renderer ? this->Inner->Renderer->statistics().adapter : "";
+  return this->Inner->Adapter.c_str();
+}
+
+vtkIdType vtkHaliteMapper::GetNumberOfTetrahedra()
+{
+  return this->Inner->Renderer ? static_cast<vtkIdType>(this->Inner->Renderer->statistics().tetrahedra) : 0;
+}
+
+namespace
+{
+
+// The array that is drawn, and how. Throws if there is none, or VTK has no meaning for it.
+void ChooseField(Content& content, vtkVolumeProperty* property, vtkDataArray* array, int cellFlag)
+{
+  if (!array)
+  {
+    throw halite::Error("the input has no array to draw: check the scalar mode and SelectScalarArray");
+  }
+  vtkUnstructuredGridBase* grid = content.Grid;
+  // Field data belongs to what it has as many tuples as.
+  const bool ofCells = cellFlag == 1 || (cellFlag == 2 && array->GetNumberOfTuples() != grid->GetNumberOfPoints());
+  const vtkIdType expected = ofCells ? grid->GetNumberOfCells() : grid->GetNumberOfPoints();
+  if (array->GetNumberOfTuples() != expected)
+  {
+    throw halite::Error("the array \"" + Text(array->GetName()) + "\" has " +
+      std::to_string(array->GetNumberOfTuples()) + " tuples for " + std::to_string(expected) +
+      (ofCells ? " cells" : " points"));
+  }
+  content.Array = array;
+  content.Association = ofCells ? halite::Association::Cells : halite::Association::Points;
+  const int n = array->GetNumberOfComponents();
+  content.Component = 0;
+  if (n > 1 && !property->GetIndependentComponents())
+  {
+    if (n != 2 && n != 4)
+    {
+      throw halite::Error("the array \"" + Text(array->GetName()) + "\" has " + std::to_string(n) +
+        " dependent components: 2 (colour, opacity) or 4 (RGBA) can be drawn, or one of independent ones");
+    }
+    content.Component = halite::AllComponents;
+  }
+  else if (n > 1 && property->GetColorChannels() == 3)
+  {
+    vtkColorTransferFunction* colors = property->GetRGBTransferFunction(0);
+    const bool magnitude = colors->GetVectorMode() == vtkScalarsToColors::MAGNITUDE;
+    content.Component =
+      magnitude ? static_cast<int>(halite::Magnitude) : std::min(std::max(colors->GetVectorComponent(), 0), n - 1);
+  }
+  content.FieldKey = Key();
+  content.FieldKey << static_cast<std::uint64_t>(array->GetMTime()) << static_cast<std::uint64_t>(ofCells)
+                   << static_cast<double>(content.Component);
+}
+
+// The functions. Those of four dependent components are the array's own.
+void ChooseFunction(Content& content, vtkVolumeProperty* property, const Knots& knots, int convention)
+{
+  halite::TransferFunction& f = content.Function;
+  f.color = knots.Color;
+  f.opacity = knots.Opacity;
+  if (content.Component == halite::AllComponents && content.Array->GetNumberOfComponents() == 4)
+  {
+    const double one = content.Array->GetDataType() == VTK_UNSIGNED_CHAR ? 255 : 1;
+    const double most = std::max(one, content.Array->GetRange(3)[1]);
+    f.opacity = { { 0, 0 }, { most, most / one } };
+  }
+  f.unitDistance = property->GetScalarOpacityUnitDistance(0);
+  f.convention = convention == vtkHaliteMapper::OPACITY ? halite::OpacityConvention::Opacity
+                                                        : halite::OpacityConvention::Extinction;
+  content.FunctionKey = Key();
+  content.FunctionKey << f.unitDistance << static_cast<std::uint64_t>(convention);
+  for (const auto& k : f.color)
+  {
+    content.FunctionKey << k.scalar << k.rgb;
+  }
+  content.FunctionKey << static_cast<std::uint64_t>(f.color.size());
+  for (const auto& k : f.opacity)
+  {
+    content.FunctionKey << k.scalar << k.opacity;
+  }
+}
+
+// World to eye and eye to clip coordinates, as the window draws opaque geometry.
+void MatricesOf(vtkRenderer* renderer, Matrix& toEye, Matrix& toClip)
+{
+  vtkCamera* camera = renderer->GetActiveCamera();
+  vtkNew<vtkMatrix4x4> eye, clip;
+  if (auto opengl = vtkOpenGLCamera::SafeDownCast(camera))
+  {
+    vtkMatrix4x4 *wcvc, *vcdc, *wcdc;
+    vtkMatrix3x3* normals;
+    opengl->GetKeyMatrices(renderer, wcvc, normals, vcdc, wcdc);
+    vtkMatrix4x4::Transpose(wcvc, eye);
+    vtkMatrix4x4::Transpose(vcdc, clip);
+  }
+  else
+  {
+    eye->DeepCopy(camera->GetModelViewTransformMatrix());
+    clip->DeepCopy(camera->GetProjectionTransformMatrix(renderer->GetTiledAspectRatio(), -1, 1));
+  }
+  toEye = RowsOf(eye);
+  toClip = RowsOf(clip);
+}
+
+}
+
+void vtkHaliteMapper::Internals::Choose(vtkHaliteMapper& self, Content& content, vtkVolume* volume)
+{
+  content.SettingsKey << Text(self.Device) << Text(self.Engine) << Text(self.Integral)
+                      << static_cast<std::uint64_t>(self.NumberOfThreads);
+  content.MeshKey << MeshView::Identity(content.Grid);
+  vtkNew<vtkMatrix4x4> placement;
+  vtkHaliteCompatibility::GetMatrix(volume, placement);
+  content.Placement = RowsOf(placement);
+  content.PlacementKey << content.Placement;
+  int cellFlag = 0;
+  vtkDataArray* array = vtkAbstractMapper::GetScalars(
+    content.Grid, self.ScalarMode, self.ArrayAccessMode, self.ArrayId, self.ArrayName, cellFlag);
+  vtkVolumeProperty* property = volume->GetProperty();
+  ChooseField(content, property, array, cellFlag);
+  const bool rgba = content.Component == halite::AllComponents && array->GetNumberOfComponents() == 4;
+  ChooseFunction(content, property, this->KnotsOf(property, rgba), self.OpacityConvention);
+}
+
+void vtkHaliteMapper::Internals::Prepare(vtkHaliteMapper& self, const Content& content)
+{
+  MeshView view;
+  // What fails half way is not held, and what follows from it neither.
+  auto isNew = [](Key& held, const Key& wanted) {
+    const bool differs = held != wanted;
+    if (differs)
+    {
+      held = Key();
+    }
+    return differs;
+  };
+  if (!this->Renderer || isNew(this->SettingsKey, content.SettingsKey))
+  {
+    halite::Settings settings;
+    settings.threads = static_cast<std::size_t>(self.NumberOfThreads);
+    settings.device = Text(self.Device);
+    settings.engine = Text(self.Engine);
+    settings.integral = Text(self.Integral);
+    this->Renderer.reset();
+    this->Renderer.reset(new halite::Renderer(settings));
+    this->SettingsKey = content.SettingsKey;
+    this->MeshKey = this->PlacementKey = this->FieldKey = this->FunctionKey = Key();
+  }
+  bool hasMesh = !isNew(this->MeshKey, content.MeshKey);
+  if (hasMesh && isNew(this->PlacementKey, content.PlacementKey))
+  {
+    hasMesh = this->Renderer->movePoints(view.Points(content.Grid), &content.Placement);
+    self.NumberOfPointUploads += hasMesh;
+  }
+  if (!hasMesh)
+  {
+    this->MeshKey = this->FieldKey = Key();
+    this->Renderer->setMesh(view.Mesh(content.Grid), &content.Placement);
+    ++self.NumberOfMeshUploads;
+    this->MeshKey = content.MeshKey;
+  }
+  this->PlacementKey = content.PlacementKey;
+  if (isNew(this->FieldKey, content.FieldKey))
+  {
+    const int n = content.Array->GetNumberOfComponents();
+    const halite::Numbers numbers = view.Numbers(content.Array, content.Component);
+    const bool single = numbers.count == static_cast<std::size_t>(content.Array->GetNumberOfTuples());
+    this->Renderer->setField(Text(content.Array->GetName()), content.Association, single ? 1 : n,
+      single && n > 1 ? 0 : content.Component, numbers);
+    ++self.NumberOfFieldUploads;
+    this->FieldKey = content.FieldKey;
+  }
+  if (isNew(this->FunctionKey, content.FunctionKey))
+  {
+    this->Renderer->setTransferFunction(content.Function);
+    ++self.NumberOfFunctionUploads;
+    this->FunctionKey = content.FunctionKey;
+  }
+  self.NumberOfCopies += view.GetCopies();
+}
+
+void vtkHaliteMapper::Render(vtkRenderer* renderer, vtkVolume* volume)
+{
+  Internals& inner = *this->Inner;
+  this->PrepareTime = this->DepthTime = this->CoreTime = this->PresentTime = 0;
+  this->TimeToDraw = 0;
+  auto say = [&](const std::string& what) {
+    if (inner.Said.insert(what).second)
+    {
+      vtkErrorMacro(<< what);
+    }
+  };
+  auto remark = [&](const char* what) {
+    if (inner.Said.insert(what).second)
+    {
+      vtkWarningMacro(<< what);
+    }
+  };
+
+  auto window = vtkOpenGLRenderWindow::SafeDownCast(renderer->GetVTKWindow());
+  if (!window)
+  {
+    say("Halite draws in OpenGL windows only, and this is none");
+    return;
+  }
+  // A volume has no cell or point to be picked.
+  if (renderer->GetSelector())
+  {
+    return;
+  }
+  Content content;
+  content.Grid = vtkUnstructuredGridBase::SafeDownCast(this->GetInputDataObject(0, 0));
+  vtkVolumeProperty* property = volume->GetProperty();
+  if (!content.Grid || !property)
+  {
+    say("there is no unstructured grid to draw");
+    return;
+  }
+  if (content.Grid->GetNumberOfCells() == 0)
+  {
+    return;
+  }
+  Viewport viewport;
+  renderer->GetTiledSizeAndOrigin(&viewport.Width, &viewport.Height, &viewport.X, &viewport.Y);
+  if (viewport.Width <= 0 || viewport.Height <= 0)
+  {
+    return;
+  }
+  if (property->GetShade(0))
+  {
+    remark("Halite does not shade: the volume emits light and absorbs it");
+  }
+  if (property->HasGradientOpacity(0) && !property->GetDisableGradientOpacity(0))
+  {
+    remark("Halite does not draw gradient opacity");
+  }
+  if (property->GetTransferFunctionMode() == vtkVolumeProperty::TF_2D)
+  {
+    remark("Halite does not draw 2D transfer functions; the 1D functions are used");
+  }
+
+  ForwardLog();
+  const double start = Now();
+  Key wanted;
+  try
+  {
+    Frame& frame = inner.FrameOf(renderer, volume, renderer->GetActiveCamera()->GetLeftEye());
+    halite::View view;
+    Matrix toEye, toClip;
+    {
+      Clock clock(this->PrepareTime);
+      inner.Choose(*this, content, volume);
+      wanted << content.SettingsKey << content.MeshKey << content.PlacementKey << content.FieldKey << content.FunctionKey;
+      MatricesOf(renderer, toEye, toClip);
+      view.worldToEye = &toEye;
+      view.eyeToClip = &toClip;
+      view.width = static_cast<std::uint32_t>(std::ceil(viewport.Width / this->ImageSampleDistance));
+      view.height = static_cast<std::uint32_t>(std::ceil(viewport.Height / this->ImageSampleDistance));
+      view.bottomUp = true;
+      view.maximum = this->GetBlendMode() == vtkUnstructuredGridVolumeMapper::MAXIMUM_INTENSITY_BLEND;
+      wanted << toEye << toClip << static_cast<double>(view.width) << static_cast<double>(view.height)
+             << static_cast<std::uint64_t>(view.maximum);
+      for (int i = 0; i < this->GetNumberOfClippingPlanes(); ++i)
+      {
+        vtkPlane* plane = this->ClippingPlanes->GetItem(i);
+        halite::ClippingPlane p;
+        plane->GetOrigin(p.origin.data());
+        plane->GetNormal(p.normal.data());
+        view.planes.push_back(p);
+        wanted << p.origin << p.normal;
+      }
+    }
+    if (inner.Failed == wanted)
+    {
+      return;
+    }
+    std::vector<float> depths;
+    // Where nothing was drawn and nothing kept, nothing ends rays.
+    if (renderer->GetNumberOfPropsRendered() > 0 || renderer->GetPreserveDepthBuffer() || !renderer->GetErase())
+    {
+      Clock clock(this->DepthTime);
+      Presenter::ReadDepths(window, viewport, view.width, view.height, depths);
+      if (std::all_of(depths.begin(), depths.end(), [](float d) { return d >= 1; }))
+      {
+        depths.clear();
+      }
+    }
+    if (!frame.Texture || frame.Pictured != wanted || frame.Depths != depths)
+    {
+          frame.Texture = nullptr;
+      frame.Pictured = wanted;
+      frame.Depths.swap(depths);
+      view.depths = frame.Depths.empty() ? nullptr : frame.Depths.data();
+      {
+        Clock clock(this->PrepareTime);
+        inner.Prepare(*this, content);
+      }
+      Clock clock(this->CoreTime);
+      inner.Pixels.resize(std::size_t(4) * view.width * view.height);
+      const bool finished = inner.Renderer->render(view, inner.Pixels.data(), [&](double share) {
+        this->InvokeEvent(vtkCommand::VolumeMapperRenderProgressEvent, &share);
+        return !window->CheckAbortStatus();
+      });
+      ++this->NumberOfFrames;
+      if (!finished)
+      {
+        return;
+      }
+    }
+    Clock clock(this->PresentTime);
+    // Handlers of events may have drawn elsewhere.
+    window->MakeCurrent();
+    Presenter& presenter = inner.PresenterOf(window);
+    if (!frame.Texture)
+    {
+      frame.Texture = presenter.Upload(view.width, view.height, inner.Pixels);
+    }
+    presenter.Present(frame.Texture, viewport);
+  }
+  catch (const std::exception& error)
+  {
+    inner.Failed = wanted;
+    say(error.what());
+  }
+  this->TimeToDraw = Now() - start;
+}
+
+VTK_ABI_NAMESPACE_END

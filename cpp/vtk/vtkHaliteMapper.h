@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+/**
+ * @class   vtkHaliteMapper
+ * @brief   exact volume rendering of unstructured grids
+ *
+ * Draws any vtkUnstructuredGrid as a volume, by Halite: every pixel is the emission-absorption integral of the field that
+ * the grid defines. Grids need no triangulation: tetrahedra, voxels, hexahedra, wedges and pyramids may be mixed, cells of two
+ * dimensions and less are left out, and so are ghost, duplicate and hidden cells and cells with hidden points.
+ *
+ * Honoured are: scalar modes and SelectScalarArray; arrays of any layout and number type; of vtkVolumeProperty the colour or grey
+ * function of component 0 in any colour space, its scalar opacity and that unit distance, and IndependentComponents: on, one component
+ * or the magnitude is drawn as the colour function's vector mode says; off, two components are the values of the colour and opacity
+ * functions, four are red, green, blue and opacity themselves (as in vtkProjectedTetrahedraMapper); both blend modes;
+ * clipping planes; the volume's matrix, mirror images included; any camera; opaque geometry, wherever it is. Not honoured, and said
+ * once as a warning, are shading, gradient opacity and 2D transfer functions.
+ *
+ * It is a vtkProjectedTetrahedraMapper so that it can take that one's place through VTK's object factory (see SetOverride). What
+ * VTK's own implementation can be told is accepted; sort and frame buffer format change nothing here.
+ *
+ * Nothing is drawn anew while camera, data, functions and opaque geometry stay as they are. What fails is an error by
+ * vtkErrorMacro, said once, and leaves the volume out of the picture.
+ *
+ * @sa
+ * vtkProjectedTetrahedraMapper vtkVolumeProperty
+ */
+#ifndef vtkHaliteMapper_h
+#define vtkHaliteMapper_h
+
+#include "vtkHaliteModule.h" // for export macro
+#include "vtkProjectedTetrahedraMapper.h"
+
+#include <memory> // for std::unique_ptr
+
+#ifdef VTK_ABI_NAMESPACE_BEGIN
+VTK_ABI_NAMESPACE_BEGIN
+#endif
+
+class VTKHALITE_EXPORT vtkHaliteMapper : public vtkProjectedTetrahedraMapper
+{
+public:
+  static vtkHaliteMapper* New();
+  vtkTypeMacro(vtkHaliteMapper, vtkProjectedTetrahedraMapper);
+  void PrintSelf(ostream& os, vtkIndent indent) override;
+
+  void Render(vtkRenderer* renderer, vtkVolume* volume) override;
+  void ReleaseGraphicsResources(vtkWindow* window) override;
+  bool IsSupported(vtkRenderWindow* window) override;
+
+  ///@{
+  /**
+   * Where frames are computed: "auto" (the default: a GPU if there is one, else the CPU), "cpu", or a GPU by its index, its UUID or a
+   * part of its name. The environment variable HALITE_DEVICE overrides "auto".
+   */
+  vtkSetStringMacro(Device);
+  vtkGetStringMacro(Device);
+  ///@}
+
+  ///@{
+  /**
+   * How: "auto" (the default) or "traverse".
+   */
+  vtkSetStringMacro(Engine);
+  vtkGetStringMacro(Engine);
+  ///@}
+
+  ///@{
+  /**
+   * The form of the ray integral: "auto" (the default) or "exact".
+   */
+  vtkSetStringMacro(Integral);
+  vtkGetStringMacro(Integral);
+  ///@}
+
+  enum OpacityConventions
+  {
+    EXTINCTION,
+    OPACITY
+  };
+
+  ///@{
+  /**
+   * What opacity a and unit distance d mean. EXTINCTION (the default): the extinction per unit length is a / d, as in VTK's
+   * mappers of unstructured grids. OPACITY: it is -ln(1 - a) / d, as in those of image data.
+   */
+  vtkSetClampMacro(OpacityConvention, int, EXTINCTION, OPACITY);
+  vtkGetMacro(OpacityConvention, int);
+  void SetOpacityConventionToExtinction() { this->SetOpacityConvention(EXTINCTION); }
+  void SetOpacityConventionToOpacity() { this->SetOpacityConvention(OPACITY); }
+  ///@}
+
+  ///@{
+  /**
+   * Distance between rays, in pixels: with 2, a fourth of the pixels is computed, and enlarged. 1 by default.
+   */
+  vtkSetClampMacro(ImageSampleDistance, double, 1.0, 100.0);
+  vtkGetMacro(ImageSampleDistance, double);
+  ///@}
+
+  ///@{
+  /**
+   * Threads of this mapper where the CPU draws; 0 (the default) is one for each core.
+   */
+  vtkSetClampMacro(NumberOfThreads, int, 0, 1024);
+  vtkGetMacro(NumberOfThreads, int);
+  ///@}
+
+  ///@{
+  /**
+   * Accepted because VTK's own mapper has it. Halite's pictures are always made of 32-bit floats.
+   */
+  vtkSetMacro(UseFloatingPointFrameBuffer, bool);
+  vtkGetMacro(UseFloatingPointFrameBuffer, bool);
+  vtkBooleanMacro(UseFloatingPointFrameBuffer, bool);
+  ///@}
+
+  /**
+   * Whether vtkProjectedTetrahedraMapper::New() makes mappers of this class, where nobody asks for it by name. Importing the Python
+   * package, loading the library through VTK_AUTOLOAD_PATH and linking the module with vtk_module_autoinit turn it on, unless the
+   * environment variable HALITE_OVERRIDE is 0.
+   */
+  static void SetOverride(bool on);
+  static bool GetOverride();
+
+  /**
+   * As SetOverride(true), unless HALITE_OVERRIDE is 0: what importing and linking do.
+   */
+  static void RegisterOverride();
+
+  ///@{
+  /**
+   * What the last frames took, in seconds: bringing what changed to the core; reading the depth buffer; the core's picture;
+   * uploading and blending it. What a frame did not do took 0.
+   */
+  vtkGetMacro(PrepareTime, double);
+  vtkGetMacro(DepthTime, double);
+  vtkGetMacro(CoreTime, double);
+  vtkGetMacro(PresentTime, double);
+  ///@}
+
+  ///@{
+  /**
+   * How often, since this mapper was made: the core drew; mesh, points, field and transfer function were handed to it; an
+   * array's layout forced a copy.
+   */
+  vtkGetMacro(NumberOfFrames, vtkIdType);
+  vtkGetMacro(NumberOfMeshUploads, vtkIdType);
+  vtkGetMacro(NumberOfPointUploads, vtkIdType);
+  vtkGetMacro(NumberOfFieldUploads, vtkIdType);
+  vtkGetMacro(NumberOfFunctionUploads, vtkIdType);
+  vtkGetMacro(NumberOfCopies, vtkIdType);
+  ///@}
+
+  /**
+   * The processor or adapter that drew last, and tetrahedra drawn.
+   */
+  const char* GetAdapter();
+  vtkIdType GetNumberOfTetrahedra();
+
+protected:
+  vtkHaliteMapper();
+  ~vtkHaliteMapper() override;
+
+  char* Device = nullptr;
+  char* Engine = nullptr;
+  char* Integral = nullptr;
+  int OpacityConvention = EXTINCTION;
+  double ImageSampleDistance = 1.0;
+  int NumberOfThreads = 0;
+  bool UseFloatingPointFrameBuffer = true;
+
+  double PrepareTime = 0;
+  double DepthTime = 0;
+  double CoreTime = 0;
+  double PresentTime = 0;
+  vtkIdType NumberOfFrames = 0;
+  vtkIdType NumberOfMeshUploads = 0;
+  vtkIdType NumberOfPointUploads = 0;
+  vtkIdType NumberOfFieldUploads = 0;
+  vtkIdType NumberOfFunctionUploads = 0;
+  vtkIdType NumberOfCopies = 0;
+
+private:
+  vtkHaliteMapper(const vtkHaliteMapper&) = delete;
+  void operator=(const vtkHaliteMapper&) = delete;
+
+  struct Internals;
+  std::unique_ptr<Internals> Inner;
+};
+
+#ifdef VTK_ABI_NAMESPACE_END
+VTK_ABI_NAMESPACE_END
+#endif
+#endif

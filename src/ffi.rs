@@ -1,0 +1,479 @@
+//! The bridge to C++: what `cpp/core/halite.h` is made of, which is the face that programs see. No logic is here.
+//!
+//! A panic that crossed the border would abort the host, so every function is guarded, and returns a `Result`: in C++ an
+//! exception.
+
+#![allow(unsafe_code, reason = "cxx makes unsafe code of the bridge")]
+#![allow(clippy::needless_pass_by_value, reason = "the bridge hands structs over by value")]
+#![allow(unreachable_pub, unused_qualifications, reason = "cxx makes names of its own public, and says where they are")]
+
+use crate::error::{Error, Result};
+use crate::field::{Association, Component, Field};
+use crate::host::{Session, guard, keep_log, take_log};
+use crate::image::{Backdrop, Image};
+use crate::mesh::cells::name;
+use crate::mesh::{Array, Cells, Mesh, Values, with_values};
+use crate::transfer::{Convention, TransferFunction};
+use crate::view::{Blend, Camera, ClippingPlane, DepthBuffer, DepthKind, Projection, View};
+use bridge::{ArrayInfo, CameraSpec, CellCount, FieldSpec, Numbers, Stats, TransferSpec, Type, ViewSpec};
+use glam::{DMat4, DVec3};
+use rayon::prelude::*;
+use std::path::Path;
+
+#[cxx::bridge(namespace = "halite::bridge")]
+#[allow(missing_docs, reason = "private to the library; halite.h documents what it offers")]
+mod bridge {
+    #[derive(Debug, Clone, Copy)]
+    enum Type {
+        I8,
+        U8,
+        I16,
+        U16,
+        I32,
+        U32,
+        I64,
+        U64,
+        F32,
+        F64,
+    }
+
+    /// Numbers of a type that is known only when the program runs, borrowed for the call.
+    #[derive(Clone, Copy)]
+    struct Numbers<'a> {
+        kind: Type,
+        bytes: &'a [u8],
+    }
+
+    struct ArrayInfo {
+        name: String,
+        of_cells: bool,
+        kind: Type,
+        components: usize,
+        tuples: usize,
+    }
+
+    struct CellCount {
+        vtk_type: u8,
+        name: String,
+        count: usize,
+    }
+
+    struct FieldSpec<'a> {
+        name: &'a str,
+        of_cells: bool,
+        components: usize,
+        /// From 0; −1 is the magnitude, −2 all of them.
+        component: i32,
+    }
+
+    struct TransferSpec<'a> {
+        /// (s, red, green, blue) for each knot.
+        color: &'a [f64],
+        /// (s, opacity) for each knot.
+        opacity: &'a [f64],
+        unit_distance: f64,
+        /// VTK's convention of image data, not that of unstructured grids.
+        slab: bool,
+    }
+
+    struct CameraSpec {
+        position: [f64; 3],
+        focal_point: [f64; 3],
+        view_up: [f64; 3],
+        parallel: bool,
+        /// In degrees, or half the height of the view.
+        angle_or_scale: f64,
+        /// From `near` to `far` if `near` < `far`.
+        near: f64,
+        far: f64,
+    }
+
+    struct ViewSpec<'a> {
+        width: u32,
+        height: u32,
+        /// Row 0 of depths and pixels is the lowest, as in OpenGL.
+        bottom_up: bool,
+        maximum: bool,
+        /// World to eye and eye to clip coordinates, rows first; the camera is not asked then.
+        by_matrices: bool,
+        to_eye: [f64; 16],
+        to_clip: [f64; 16],
+        camera: CameraSpec,
+        /// Origin and normal of each.
+        planes: &'a [f64],
+        /// One window depth per pixel, or none.
+        depths: &'a [f32],
+    }
+
+    struct Stats {
+        engine: String,
+        device: String,
+        adapter: String,
+        cells: u64,
+        tetrahedra: u64,
+        faces_ms: f64,
+        upload_ms: f64,
+        frame_ms: f64,
+        steps: u64,
+        repaired_rays: u64,
+        device_bytes: u64,
+        uploaded_bytes: u64,
+    }
+
+    unsafe extern "C++" {
+        include!("progress.h");
+        type Progress;
+        fn tell(self: &Progress, share: f64) -> Result<bool>;
+    }
+
+    extern "Rust" {
+        type Mesh;
+        type Session;
+
+        fn keep_log_lines() -> Result<()>;
+        fn take_log_lines() -> Result<Vec<String>>;
+
+        fn open_mesh(path: &str, threads: usize) -> Result<Box<Mesh>>;
+        fn new_mesh(points: Numbers, types: &[u8], offsets: Numbers, connectivity: Numbers) -> Result<Box<Mesh>>;
+        fn add_array(mesh: &mut Mesh, name: &str, of_cells: bool, components: usize, numbers: Numbers) -> Result<()>;
+        fn arrays(mesh: &Mesh) -> Result<Vec<ArrayInfo>>;
+        fn array_values(mesh: &Mesh, index: usize) -> Result<Vec<f64>>;
+        fn cell_counts(mesh: &Mesh) -> Result<Vec<CellCount>>;
+        fn points(mesh: &Mesh) -> Result<Vec<f64>>;
+        fn types(mesh: &Mesh) -> Result<Vec<u8>>;
+        fn offsets(mesh: &Mesh) -> Result<Vec<u64>>;
+        fn connectivity(mesh: &Mesh) -> Result<Vec<u32>>;
+
+        fn new_session(threads: usize, device: &str, engine: &str, integral: &str) -> Result<Box<Session>>;
+        fn set_mesh(session: &mut Session, mesh: &Mesh, matrix: [f64; 16]) -> Result<()>;
+        fn move_points(session: &mut Session, points: Numbers, matrix: [f64; 16]) -> Result<bool>;
+        fn move_mesh(session: &mut Session, mesh: &Mesh, matrix: [f64; 16]) -> Result<bool>;
+        fn set_field(session: &mut Session, spec: FieldSpec, numbers: Numbers) -> Result<()>;
+        fn set_mesh_field(session: &mut Session, mesh: &Mesh, index: usize, component: i32) -> Result<()>;
+        fn set_transfer(session: &mut Session, spec: TransferSpec) -> Result<()>;
+        fn render(session: &mut Session, spec: ViewSpec, pixels: &mut [f32], progress: &Progress) -> Result<bool>;
+        fn stats(session: &Session) -> Result<Stats>;
+
+        fn save_image(path: &str, width: u32, height: u32, pixels: &[f32], background: &[f32]) -> Result<()>;
+    }
+}
+use bridge::Progress;
+
+fn keep_log_lines() -> Result<()> {
+    guard(|| {
+        keep_log();
+        Ok(())
+    })
+}
+
+fn take_log_lines() -> Result<Vec<String>> {
+    guard(|| Ok(take_log()))
+}
+
+fn open_mesh(path: &str, threads: usize) -> Result<Box<Mesh>> {
+    guard(|| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let pool = pool.map_err(|e| Error::Render(format!("cannot start {threads} threads: {e}")))?;
+        pool.install(|| crate::io::open(Path::new(path), &|_| ())).map(Box::new)
+    })
+}
+
+fn new_mesh(points: Numbers, types: &[u8], offsets: Numbers, connectivity: Numbers) -> Result<Box<Mesh>> {
+    guard(|| {
+        let index = |what: &str, numbers: Numbers| -> Result<Vec<u64>> {
+            let negative = || Error::Mesh(format!("{what} are negative, or no integers"));
+            match numbers.kind {
+                Type::I32 => {
+                    cast::<i32>(&numbers)?.par_iter().map(|&i| u64::try_from(i).map_err(|_| negative())).collect()
+                }
+                Type::I64 => {
+                    cast::<i64>(&numbers)?.par_iter().map(|&i| u64::try_from(i).map_err(|_| negative())).collect()
+                }
+                Type::U32 => Ok(cast::<u32>(&numbers)?.iter().map(|&i| u64::from(i)).collect()),
+                Type::U64 => Ok(cast::<u64>(&numbers)?.to_vec()),
+                _ => Err(negative()),
+            }
+        };
+        let narrow = |i: u64| u32::try_from(i).map_err(|_| Error::Mesh(format!("a cell names point {i}")));
+        let connectivity: Vec<u32> = match connectivity.kind {
+            Type::U32 => cast::<u32>(&connectivity)?.to_vec(),
+            _ => index("point indices", connectivity)?.into_par_iter().map(narrow).collect::<Result<_>>()?,
+        };
+        let cells = Cells { types: types.to_vec(), offsets: index("offsets", offsets)?, connectivity };
+        Mesh::new(triples(&points)?, cells, vec![], vec![]).map(Box::new)
+    })
+}
+
+fn add_array(mesh: &mut Mesh, name: &str, of_cells: bool, components: usize, numbers: Numbers) -> Result<()> {
+    guard(|| {
+        let array = Array { name: name.into(), components, values: values(&numbers)? };
+        if of_cells { mesh.add_cell_array(array) } else { mesh.add_point_array(array) }
+    })
+}
+
+/// Arrays of points first, then those of cells.
+fn all_arrays(mesh: &Mesh) -> impl Iterator<Item = (bool, &Array)> {
+    mesh.point_arrays().iter().map(|a| (false, a)).chain(mesh.cell_arrays().iter().map(|a| (true, a)))
+}
+
+fn array(mesh: &Mesh, index: usize) -> Result<(bool, &Array)> {
+    all_arrays(mesh).nth(index).ok_or_else(|| Error::Field(format!("the mesh has no array {index}")))
+}
+
+fn arrays(mesh: &Mesh) -> Result<Vec<ArrayInfo>> {
+    let kind = |v: &Values| match v {
+        Values::I8(_) => Type::I8,
+        Values::U8(_) => Type::U8,
+        Values::I16(_) => Type::I16,
+        Values::U16(_) => Type::U16,
+        Values::I32(_) => Type::I32,
+        Values::U32(_) => Type::U32,
+        Values::I64(_) => Type::I64,
+        Values::U64(_) => Type::U64,
+        Values::F32(_) => Type::F32,
+        Values::F64(_) => Type::F64,
+    };
+    let info = |(of_cells, a): (bool, &Array)| ArrayInfo {
+        name: a.name.clone(),
+        of_cells,
+        kind: kind(&a.values),
+        components: a.components,
+        tuples: a.tuples(),
+    };
+    guard(|| Ok(all_arrays(mesh).map(info).collect()))
+}
+
+fn array_values(mesh: &Mesh, index: usize) -> Result<Vec<f64>> {
+    guard(|| {
+        let (_, array) = array(mesh, index)?;
+        Ok((0..array.values.len()).map(|i| array.values.get(i)).collect())
+    })
+}
+
+fn cell_counts(mesh: &Mesh) -> Result<Vec<CellCount>> {
+    guard(|| {
+        let mut counts = [0; 256];
+        mesh.cells().types.iter().for_each(|&t| counts[usize::from(t)] += 1);
+        let count = |t: u8| CellCount { vtk_type: t, name: name(t).into(), count: counts[usize::from(t)] };
+        Ok((0..=255).map(count).filter(|c| c.count > 0).collect())
+    })
+}
+
+fn points(mesh: &Mesh) -> Result<Vec<f64>> {
+    guard(|| Ok(mesh.points().iter().flat_map(|p| p.to_array()).collect()))
+}
+
+fn types(mesh: &Mesh) -> Result<Vec<u8>> {
+    guard(|| Ok(mesh.cells().types.clone()))
+}
+
+fn offsets(mesh: &Mesh) -> Result<Vec<u64>> {
+    guard(|| Ok(mesh.cells().offsets.clone()))
+}
+
+fn connectivity(mesh: &Mesh) -> Result<Vec<u32>> {
+    guard(|| Ok(mesh.cells().connectivity.clone()))
+}
+
+fn new_session(threads: usize, device: &str, engine: &str, integral: &str) -> Result<Box<Session>> {
+    guard(|| Session::new(threads, device, engine, integral).map(Box::new))
+}
+
+fn set_mesh(session: &mut Session, mesh: &Mesh, matrix: [f64; 16]) -> Result<()> {
+    session.guarded(|s| s.set_mesh(mesh, rows(matrix)))
+}
+
+fn move_points(session: &mut Session, points: Numbers, matrix: [f64; 16]) -> Result<bool> {
+    session.guarded(|s| s.set_points(&triples(&points)?, rows(matrix)))
+}
+
+fn move_mesh(session: &mut Session, mesh: &Mesh, matrix: [f64; 16]) -> Result<bool> {
+    session.guarded(|s| s.set_points(mesh.points(), rows(matrix)))
+}
+
+fn association(of_cells: bool) -> Association {
+    if of_cells { Association::Cell } else { Association::Point }
+}
+
+fn component(code: i32) -> Component {
+    match usize::try_from(code) {
+        Ok(i) => Component::Index(i),
+        Err(_) if code == -1 => Component::Magnitude,
+        Err(_) => Component::All,
+    }
+}
+
+fn set_field(session: &mut Session, spec: FieldSpec, numbers: Numbers) -> Result<()> {
+    let (of, what) = (association(spec.of_cells), component(spec.component));
+    macro_rules! from {
+        ($t:ty) => {
+            cast::<$t>(&numbers).and_then(|v| Field::from_slice(spec.name, v, spec.components, of, what))
+        };
+    }
+    session.guarded(|s| {
+        s.set_field(|| match numbers.kind {
+            Type::I8 => from!(i8),
+            Type::U8 => from!(u8),
+            Type::I16 => from!(i16),
+            Type::U16 => from!(u16),
+            Type::I32 => from!(i32),
+            Type::U32 => from!(u32),
+            Type::I64 => from!(i64),
+            Type::U64 => from!(u64),
+            Type::F32 => from!(f32),
+            _ => from!(f64),
+        })
+    })
+}
+
+fn set_mesh_field(session: &mut Session, mesh: &Mesh, index: usize, code: i32) -> Result<()> {
+    session.guarded(|s| {
+        let (of_cells, array) = array(mesh, index)?;
+        s.set_field(|| Field::from_array(array, association(of_cells), component(code)))
+    })
+}
+
+fn set_transfer(session: &mut Session, spec: TransferSpec) -> Result<()> {
+    session.guarded(|s| {
+        let color = spec.color.as_chunks().0.iter().map(|&[x, r, g, b]| (x, [r, g, b])).collect();
+        let opacity = spec.opacity.as_chunks().0.iter().map(|&[x, a]| (x, a)).collect();
+        let convention = if spec.slab { Convention::Opacity } else { Convention::Extinction };
+        s.set_transfer(&TransferFunction::new(color, opacity, spec.unit_distance)?.with_convention(convention));
+        Ok(())
+    })
+}
+
+/// False if `progress` ended the frame.
+fn render(session: &mut Session, spec: ViewSpec, pixels: &mut [f32], progress: &Progress) -> Result<bool> {
+    session.guarded(|s| {
+        let view = view(&spec)?;
+        let (w, h) = (spec.width as usize, spec.height as usize);
+        if pixels.len() != 4 * w * h {
+            return Err(Error::View(format!("a buffer of {} numbers for {w}x{h} pixels of 4", pixels.len())));
+        }
+        let mut tell = |share| progress.tell(share).map_err(|e| Error::Render(e.to_string()));
+        let image = match s.render(&view, &mut tell) {
+            Err(Error::Aborted) => return Ok(false),
+            image => image?,
+        };
+        let rows = image.pixels.chunks(w);
+        for (j, row) in rows.enumerate() {
+            let to = if spec.bottom_up { h - 1 - j } else { j };
+            pixels[4 * w * to..4 * w * (to + 1)].copy_from_slice(row.as_flattened());
+        }
+        Ok(true)
+    })
+}
+
+fn view(spec: &ViewSpec) -> Result<View> {
+    let size = [spec.width, spec.height];
+    let view = if spec.by_matrices {
+        View::from_matrices(rows(spec.to_eye), rows(spec.to_clip), size)?
+    } else {
+        camera(&spec.camera, size)?
+    };
+    let blend = if spec.maximum { Blend::Maximum } else { Blend::Composite };
+    let vectors =
+        |p: &[f64; 6]| ClippingPlane { origin: DVec3::new(p[0], p[1], p[2]), normal: DVec3::new(p[3], p[4], p[5]) };
+    let view = view.with_blend(blend).with_clipping_planes(spec.planes.as_chunks().0.iter().map(vectors).collect())?;
+    if spec.depths.is_empty() {
+        return Ok(view);
+    }
+    let w = spec.width as usize;
+    // The far plane ends nothing that the clipping range does not end.
+    let values = |row: &[f32]| row.iter().map(|&d| if d < 1.0 { f64::from(d) } else { 1.0 }).collect::<Vec<_>>();
+    let rows = spec.depths.chunks(w);
+    let values = if spec.bottom_up { rows.rev().flat_map(values).collect() } else { rows.flat_map(values).collect() };
+    view.with_depth(DepthBuffer { kind: DepthKind::Window, values })
+}
+
+fn camera(spec: &CameraSpec, size: [u32; 2]) -> Result<View> {
+    let [position, focal_point, view_up] = [spec.position, spec.focal_point, spec.view_up].map(DVec3::from_array);
+    let number = spec.angle_or_scale;
+    let projection = if spec.parallel {
+        Projection::Parallel { parallel_scale: number }
+    } else {
+        Projection::Perspective { view_angle: number }
+    };
+    let view = View::new(Camera { position, focal_point, view_up, projection }, size)?;
+    if spec.near < spec.far { view.with_clipping_range([spec.near, spec.far]) } else { Ok(view) }
+}
+
+fn stats(session: &Session) -> Result<Stats> {
+    guard(|| {
+        let s = session.stats().clone();
+        Ok(Stats {
+            engine: s.engine,
+            device: s.device,
+            adapter: s.adapter,
+            cells: s.cells,
+            tetrahedra: s.tetrahedra,
+            faces_ms: s.faces_ms,
+            upload_ms: s.upload_ms,
+            frame_ms: s.frame_ms,
+            steps: s.steps,
+            repaired_rays: s.repaired_rays,
+            device_bytes: s.device_bytes,
+            uploaded_bytes: s.uploaded_bytes,
+        })
+    })
+}
+
+fn save_image(path: &str, width: u32, height: u32, pixels: &[f32], background: &[f32]) -> Result<()> {
+    guard(|| {
+        let pixels = pixels.as_chunks().0.to_vec();
+        if pixels.len() as u64 != u64::from(width) * u64::from(height) {
+            return Err(Error::View(format!("{} pixels are no image of {width}x{height}", pixels.len())));
+        }
+        let backdrop = match *background {
+            [r, g, b] => Backdrop::Color([r, g, b]),
+            _ => Backdrop::Transparent,
+        };
+        Image { size: [width, height], pixels }.save(Path::new(path), backdrop)
+    })
+}
+
+/// A matrix whose rows lie one after another.
+fn rows(matrix: [f64; 16]) -> DMat4 {
+    DMat4::from_cols_array(&matrix).transpose()
+}
+
+/// The numbers of a slice that is known to hold some type.
+fn cast<'a, T: bytemuck::Pod>(numbers: &Numbers<'a>) -> Result<&'a [T]> {
+    if numbers.bytes.is_empty() {
+        return Ok(&[]);
+    }
+    bytemuck::try_cast_slice(numbers.bytes)
+        .map_err(|e| Error::Mesh(format!("numbers that are not where they may be: {e}")))
+}
+
+/// A copy of numbers.
+fn values(numbers: &Numbers) -> Result<Values> {
+    Ok(match numbers.kind {
+        Type::I8 => Values::I8(cast(numbers)?.to_vec()),
+        Type::U8 => Values::U8(cast(numbers)?.to_vec()),
+        Type::I16 => Values::I16(cast(numbers)?.to_vec()),
+        Type::U16 => Values::U16(cast(numbers)?.to_vec()),
+        Type::I32 => Values::I32(cast(numbers)?.to_vec()),
+        Type::U32 => Values::U32(cast(numbers)?.to_vec()),
+        Type::I64 => Values::I64(cast(numbers)?.to_vec()),
+        Type::U64 => Values::U64(cast(numbers)?.to_vec()),
+        Type::F32 => Values::F32(cast(numbers)?.to_vec()),
+        _ => Values::F64(cast(numbers)?.to_vec()),
+    })
+}
+
+/// Points, of coordinates of any type.
+#[allow(clippy::cast_lossless, clippy::unnecessary_cast, reason = "one cast for ten types")]
+fn triples(numbers: &Numbers) -> Result<Vec<DVec3>> {
+    match numbers.kind {
+        Type::F64 => Ok(cast::<f64>(numbers)?.as_chunks().0.par_iter().map(|&p| DVec3::from_array(p)).collect()),
+        Type::F32 => {
+            let points = cast::<f32>(numbers)?.as_chunks().0;
+            Ok(points.par_iter().map(|p: &[f32; 3]| DVec3::from_array(p.map(f64::from))).collect())
+        }
+        _ => with_values!(&values(numbers)?, v => {
+            Ok(v.as_chunks().0.iter().map(|p: &[_; 3]| DVec3::from_array(p.map(|x| x as f64))).collect())
+        }),
+    }
+}

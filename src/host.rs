@@ -1,0 +1,419 @@
+//! What a program that embeds Halite needs around a [`Renderer`]: calls that never unwind, progress told on the caller's own
+//! thread, points under a matrix, and a log that is asked for.
+
+use crate::error::{Error, Result};
+use crate::field::Field;
+use crate::gpu::DeviceChoice;
+use crate::image::Image;
+use crate::mesh::Mesh;
+use crate::mesh::cells::{self, Tetrahedra};
+use crate::render::{Renderer, Stats};
+use crate::transfer::TransferFunction;
+use crate::view::View;
+use glam::{DMat4, DVec3};
+use rayon::prelude::*;
+use std::collections::VecDeque;
+use std::ops::ControlFlow;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Mutex, OnceLock, PoisonError};
+use std::time::Duration;
+
+/// How often the caller is told the progress of a frame.
+const TELL: Duration = Duration::from_millis(20);
+
+/// Names of the engines that a session may be asked for; the first two are the same.
+pub const ENGINES: [&str; 2] = ["auto", "traverse"];
+
+/// Names of the forms of the ray integral that a session may be asked for.
+pub const INTEGRALS: [&str; 2] = ["auto", "exact"];
+
+/// Runs `work`; a panic in it is an error.
+///
+/// # Errors
+/// That of `work`, or [`Error::Render`] with what the panic said.
+pub fn guard<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
+        let said = panic.downcast_ref::<&str>().map(ToString::to_string);
+        let said = said.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_default();
+        Err(Error::Render(format!("Halite failed, which is a bug: {}", said.replace('\n', " "))))
+    })
+}
+
+/// A renderer inside another program. After a panic it refuses all further work.
+#[derive(Debug)]
+pub struct Session {
+    renderer: Renderer,
+    state: State,
+    /// Whether the matrix of the mesh that is drawn turns right hands into left ones.
+    mirrored: bool,
+    failed: bool,
+}
+
+/// What a session has to draw.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    NoMesh,
+    /// The mesh has no cell that could be seen: its pictures are empty.
+    Empty,
+    Mesh,
+}
+
+impl Session {
+    /// A session with `threads` threads of its own (0: one for each core), on a device as [`DeviceChoice::parse`] reads it.
+    ///
+    /// # Errors
+    /// Those of [`Renderer::with_device`]; [`Error::Render`] if `engine` is none of [`ENGINES`], or `integral` none of
+    /// [`INTEGRALS`].
+    pub fn new(threads: usize, device: &str, engine: &str, integral: &str) -> Result<Self> {
+        for (what, name, known) in [("engine", engine, ENGINES), ("integral", integral, INTEGRALS)] {
+            if !name.is_empty() && !known.contains(&name.to_ascii_lowercase().as_str()) {
+                let known = known.join("\", \"");
+                return Err(Error::Render(format!("no {what} is called \"{name}\"; there are \"{known}\"")));
+            }
+        }
+        let renderer = Renderer::with_device(threads, DeviceChoice::parse(device))?;
+        Ok(Session { renderer, state: State::NoMesh, mirrored: false, failed: false })
+    }
+
+    /// Runs `work` on this session. After a panic it is not what it should be, and says so.
+    ///
+    /// # Errors
+    /// Those of [`guard`]; [`Error::Render`] after a panic.
+    pub fn guarded<T>(&mut self, work: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
+        if self.failed {
+            return Err(Error::Render("this renderer failed before and cannot go on; make another".into()));
+        }
+        self.failed = true;
+        let mut finished = false;
+        let result = guard(|| {
+            let result = work(self);
+            finished = true;
+            result
+        });
+        self.failed = !finished;
+        result
+    }
+
+    /// Draws `mesh`, under a matrix, from now on; the field must be set again. A mesh with nothing to draw is no error: its
+    /// pictures are empty.
+    ///
+    /// # Errors
+    /// [`Error::Mesh`] as [`Tetrahedra::new`], or if the matrix is not affine or not finite.
+    pub fn set_mesh(&mut self, mesh: &Mesh, matrix: DMat4) -> Result<()> {
+        check_matrix(matrix)?;
+        // Cells are split where the mesh has them, so that its pictures under a matrix do not depend on those before.
+        let tetrahedra = match self.renderer.install(|| Tetrahedra::new(mesh)) {
+            Err(Error::Empty(why)) => {
+                if !mesh.cells().is_empty() {
+                    tracing::warn!("nothing is drawn of the mesh: {why}");
+                }
+                self.state = State::Empty;
+                return Ok(());
+            }
+            other => other?,
+        };
+        tell_skipped(&tetrahedra.skipped);
+        self.mirrored = matrix.determinant() < 0.0;
+        let points = mesh.points();
+        let moved = (matrix != DMat4::IDENTITY).then(|| self.renderer.install(|| transformed(points, matrix)));
+        match moved {
+            None => self.renderer.set_mesh(mesh, tetrahedra),
+            Some(moved) if self.mirrored => self.renderer.load(&moved, mesh.cells().len(), tetrahedra),
+            Some(moved) => {
+                self.renderer.set_mesh(mesh, tetrahedra);
+                // Points that are not finite belong to no cell that is drawn.
+                self.renderer.set_points(&moved)?;
+            }
+        }
+        self.state = State::Mesh;
+        Ok(())
+    }
+
+    /// Draws the mesh with its points moved, under another matrix. False if that cannot be: the mesh must then be set again.
+    ///
+    /// # Errors
+    /// [`Error::Mesh`] if there are not as many points as before, or the matrix is not affine or not finite.
+    pub fn set_points(&mut self, points: &[DVec3], matrix: DMat4) -> Result<bool> {
+        check_matrix(matrix)?;
+        match self.state {
+            State::NoMesh => Ok(false),
+            State::Empty => Ok(true),
+            State::Mesh if self.mirrored != (matrix.determinant() < 0.0) => Ok(false),
+            State::Mesh => {
+                let moved = self.renderer.install(|| transformed(points, matrix));
+                self.renderer.set_points(&moved).map(|()| true)
+            }
+        }
+    }
+
+    /// Draws another field of the mesh.
+    ///
+    /// # Errors
+    /// Those of `field`, and of [`Renderer::set_field`].
+    pub fn set_field(&mut self, field: impl FnOnce() -> Result<Field> + Send) -> Result<()> {
+        if self.state == State::Empty {
+            return Ok(());
+        }
+        let field = self.renderer.install(field)?;
+        self.renderer.set_field(&field)
+    }
+
+    /// Draws with another transfer function.
+    pub fn set_transfer(&mut self, transfer: &TransferFunction) {
+        self.renderer.set_transfer(transfer);
+    }
+
+    /// Draws a frame. While that takes, `progress` is told every 20 ms, on this thread, the share that is done; false ends it.
+    ///
+    /// # Errors
+    /// Those of [`Renderer::render`], and of `progress`.
+    pub fn render(&mut self, view: &View, progress: &mut dyn FnMut(f64) -> Result<bool>) -> Result<Image> {
+        if self.state == State::Empty {
+            return Ok(Image::new(view.size()));
+        }
+        let (share, stop) = (AtomicU64::new(0), AtomicBool::new(false));
+        let (sender, receiver) = channel();
+        let renderer = &mut self.renderer;
+        let mut trouble = None;
+        let drawn = std::thread::scope(|scope| {
+            let tell = |done: f64| {
+                share.store(done.to_bits(), Relaxed);
+                if stop.load(Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            };
+            let worker = scope.spawn(move || {
+                // The receiver outlives this thread.
+                let _ = sender.send(renderer.render(view, &tell));
+            });
+            loop {
+                match receiver.recv_timeout(TELL) {
+                    Ok(drawn) => break drawn,
+                    Err(RecvTimeoutError::Timeout) => match progress(f64::from_bits(share.load(Relaxed))) {
+                        Ok(true) => {}
+                        Ok(false) => stop.store(true, Relaxed),
+                        Err(e) => {
+                            stop.store(true, Relaxed);
+                            trouble.get_or_insert(e);
+                        }
+                    },
+                    Err(RecvTimeoutError::Disconnected) => match worker.join() {
+                        Err(panic) => std::panic::resume_unwind(panic),
+                        Ok(()) => break Err(Error::Render("the frame was lost".into())),
+                    },
+                }
+            }
+        });
+        trouble.map_or(drawn, Err)
+    }
+
+    /// What the last calls did.
+    pub fn stats(&self) -> &Stats {
+        self.renderer.stats()
+    }
+}
+
+fn check_matrix(matrix: DMat4) -> Result<()> {
+    if matrix.is_finite() && matrix.row(3).to_array() == [0.0, 0.0, 0.0, 1.0] {
+        return Ok(());
+    }
+    Err(Error::Mesh("the matrix of the mesh is not affine, or not finite".into()))
+}
+
+/// `points` under an affine matrix; those that are not finite stay so.
+fn transformed(points: &[DVec3], matrix: DMat4) -> Vec<DVec3> {
+    points.par_iter().map(|&p| matrix.transform_point3(p)).collect()
+}
+
+fn tell_skipped(skipped: &cells::Skipped) {
+    for (&kind, count) in &skipped.unsupported {
+        tracing::warn!("{count} cells are left out: {} is not drawn yet", cells::name(kind));
+    }
+    if skipped.invisible > 0 {
+        tracing::warn!("{} cells are left out: they have a point that is not finite", skipped.invisible);
+    }
+    if skipped.lower_dimensional > 0 {
+        tracing::info!("{} cells are left out: they have no volume (2D or less)", skipped.lower_dimensional);
+    }
+}
+
+/// Lines of the log that nobody has taken yet; the oldest go first when there are too many.
+static LINES: OnceLock<Mutex<VecDeque<String>>> = OnceLock::new();
+const MOST_LINES: usize = 1000;
+
+/// Starts to keep the log: from now on [`take_log`] has it. Another log that this library was given stays as it is.
+pub fn keep_log() {
+    if LINES.set(Mutex::default()).is_ok() {
+        let _ = tracing_subscriber::fmt()
+            .with_max_level(tracing::Level::INFO)
+            .with_writer(|| Line)
+            .with_ansi(false)
+            .with_target(false)
+            .without_time()
+            .try_init();
+    }
+}
+
+/// The lines of the log since they were last taken, oldest first; each starts with its level, such as "WARN".
+pub fn take_log() -> Vec<String> {
+    LINES.get().map_or_else(Vec::new, |lines| lock(lines).drain(..).collect())
+}
+
+fn lock(lines: &Mutex<VecDeque<String>>) -> std::sync::MutexGuard<'_, VecDeque<String>> {
+    lines.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Where the subscriber writes each line at once.
+struct Line;
+
+impl std::io::Write for Line {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        if let Some(lines) = LINES.get() {
+            let mut lines = lock(lines);
+            lines.push_back(String::from_utf8_lossy(bytes).trim().to_owned());
+            if lines.len() > MOST_LINES {
+                lines.pop_front();
+            }
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::field::{Association, Component};
+    use crate::mesh::generate;
+    use crate::view::{Camera, Projection};
+
+    fn view(size: u32) -> View {
+        let projection = Projection::Perspective { view_angle: 40.0 };
+        let (position, focal_point) = (DVec3::new(4.0, 3.0, 5.0), DVec3::new(0.5, 0.5, 0.5));
+        View::new(Camera { position, focal_point, view_up: DVec3::Y, projection }, [size; 2]).unwrap()
+    }
+
+    fn mesh() -> Mesh {
+        generate::hexahedra(3)
+    }
+
+    fn session() -> Session {
+        let mut session = Session::new(2, "cpu", "auto", "exact").unwrap();
+        let opacity = vec![(0.0, 0.0), (0.4, 1.0), (0.6, 0.0), (1.0, 0.7)];
+        session.set_transfer(
+            &TransferFunction::new(vec![(0.0, [1.0, 0.5, 0.0]), (1.0, [0.0, 0.5, 1.0])], opacity, 0.3).unwrap(),
+        );
+        session
+    }
+
+    fn set(session: &mut Session, mesh: &Mesh, matrix: DMat4) {
+        session.set_mesh(mesh, matrix).unwrap();
+        set_field(session, mesh);
+    }
+
+    fn set_field(session: &mut Session, mesh: &Mesh) {
+        let values: Vec<f64> = mesh.points().iter().map(|p| p.x * 0.7 + p.y * p.z * 0.3).collect();
+        session.set_field(|| Field::from_slice("s", &values, 1, Association::Point, Component::Index(0))).unwrap();
+    }
+
+    fn draw(session: &mut Session) -> Image {
+        session.render(&view(40), &mut |_| Ok(true)).unwrap()
+    }
+
+    #[test]
+    fn a_matrix_draws_what_moved_points_draw() {
+        let mut shear = DMat4::from_scale(DVec3::new(2.0, 0.3, 1.5));
+        shear.y_axis.x = 0.8;
+        let mirror =
+            DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0)) * DMat4::from_translation(DVec3::new(-1.0, 0.2, 0.0));
+        let far = DMat4::from_scale(DVec3::splat(3.0)) * DMat4::from_rotation_z(2.0);
+        let tets = mesh();
+        let split = Tetrahedra::new(&tets).unwrap();
+        let mut moving = session();
+        set(&mut moving, &tets, DMat4::IDENTITY);
+        for matrix in [shear, mirror, far, DMat4::IDENTITY] {
+            // The same tetrahedra at the moved places, by way of a mesh of their own.
+            let types = vec![10; split.corners.len()];
+            let offsets = (0..=types.len() as u64).map(|i| 4 * i).collect();
+            let connectivity = split.corners.as_flattened().to_vec();
+            let cells = crate::mesh::Cells { types, offsets, connectivity };
+            let moved = Mesh::new(transformed(tets.points(), matrix), cells, vec![], vec![]).unwrap();
+            let mut plain = session();
+            plain.set_mesh(&moved, DMat4::IDENTITY).unwrap();
+            set_field(&mut plain, &tets);
+            let expected = draw(&mut plain);
+            assert!(expected.pixels.iter().any(|p| p[3] > 0.1), "{matrix}");
+
+            let mut fresh = session();
+            set(&mut fresh, &tets, matrix);
+            assert!(draw(&mut fresh).compare(&expected).unwrap().max < 2e-5, "{matrix}");
+
+            let kept = moving.set_points(tets.points(), matrix).unwrap();
+            assert_eq!(kept, matrix.determinant() > 0.0);
+            if kept {
+                assert!(draw(&mut moving).compare(&expected).unwrap().max < 2e-5, "{matrix}");
+            }
+        }
+    }
+
+    #[test]
+    fn progress_is_told_here_and_may_end_a_frame() {
+        let mut session = session();
+        set(&mut session, &generate::hexahedra(20), DMat4::IDENTITY);
+        let here = std::thread::current().id();
+        let mut told = vec![];
+        let slow = view(900);
+        session
+            .render(&slow, &mut |share| {
+                assert_eq!(std::thread::current().id(), here);
+                told.push(share);
+                Ok(true)
+            })
+            .unwrap();
+        assert!(told.windows(2).all(|w| w[0] <= w[1]) && told.iter().all(|s| (0.0..=1.0).contains(s)), "{told:?}");
+        assert!(!told.is_empty(), "a frame of 900 x 900 pixels takes more than 20 ms");
+        assert!(matches!(session.render(&slow, &mut |_| Ok(false)), Err(Error::Aborted)));
+        let trouble = session.render(&slow, &mut |_| Err(Error::Render("trouble".into()))).unwrap_err();
+        assert!(trouble.to_string().contains("trouble"));
+        draw(&mut session);
+    }
+
+    #[test]
+    fn a_panic_is_an_error_and_ends_the_session() {
+        let mut session = session();
+        let said = session.guarded(|_| -> Result<()> { panic!("oh\nno") }).unwrap_err().to_string();
+        assert!(said.contains("oh no"), "{said}");
+        assert!(session.guarded(|_| Ok(())).unwrap_err().to_string().contains("make another"));
+    }
+
+    #[test]
+    fn an_error_does_not_end_the_session() {
+        let mut session = session();
+        assert!(session.guarded(|s| s.set_mesh(&mesh(), DMat4::ZERO)).is_err());
+        session.guarded(|_| Ok(())).unwrap();
+    }
+
+    #[test]
+    fn a_mesh_with_nothing_to_draw_gives_empty_pictures() {
+        let mut session = session();
+        session
+            .set_mesh(
+                &Mesh::new(vec![], crate::mesh::Cells { offsets: vec![0], ..Default::default() }, vec![], vec![])
+                    .unwrap(),
+                DMat4::IDENTITY,
+            )
+            .unwrap();
+        session.set_field(|| Err(Error::Render("not asked".into()))).unwrap();
+        assert!(draw(&mut session).pixels.iter().all(|p| *p == [0.0; 4]));
+    }
+
+    #[test]
+    fn unknown_names_are_refused_with_those_that_exist() {
+        let message = Session::new(1, "cpu", "magic", "exact").unwrap_err().to_string();
+        assert!(message.contains("magic") && message.contains("traverse"), "{message}");
+        assert!(Session::new(1, "cpu", "traverse", "guess").unwrap_err().to_string().contains("exact"));
+    }
+}
