@@ -273,7 +273,6 @@ impl Project {
         view: &View,
         switches: &Switches,
     ) -> Result<(Vec<[f32; 4]>, Counts)> {
-        let start = Instant::now();
         if view.blend() == Blend::Maximum {
             let what = "the projection engine does not draw the maximum along rays; the engine \"traverse\" does";
             return Err(Error::View(what.into()));
@@ -293,6 +292,7 @@ impl Project {
         let frame = Pass::new(self, &seen)?;
         let mut counts = Counts::default();
         if !self.ordered.as_ref().is_some_and(|o| o.holds_for(&seen, switches)) {
+            let start = Instant::now();
             self.ordered = None;
             self.ordered = Some(self.order(&frame, &seen, geometry.cells.len(), switches)?);
             counts.order_ms = start.elapsed().as_secs_f64() * 1e3;
