@@ -160,7 +160,7 @@ pub(crate) struct Counts {
     pub(crate) records: u64,
     /// Finding the cells that are seen and sorting them; 0 where the order was known.
     pub(crate) order_ms: f64,
-    /// By the device's own clock, where it has one: projecting all cells of the order, and drawing them.
+    /// By the device's own clock, where it has one, or in software the host's: projecting all cells of the order, and drawing them.
     pub(crate) project_ms: Option<f64>,
     pub(crate) draw_ms: Option<f64>,
     /// Fragments that were computed, where the device counts them.

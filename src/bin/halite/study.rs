@@ -50,6 +50,7 @@ struct Row {
     max: f64,
     rmse: f64,
     order_ms: f64,
+    project_ms: Option<f64>,
     /// A frame with a camera that stands still: projecting and drawing.
     frame_ms: f64,
     cells: u64,
@@ -140,7 +141,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
             .map(|r| {
                 json!({
                     "variant": r.variant.name, "stands_in": r.variant.place, "switches": r.variant.switches,
-                    "max": r.max, "rmse": r.rmse, "order_ms": r.order_ms, "frame_ms": r.frame_ms,
+                    "max": r.max, "rmse": r.rmse, "order_ms": r.order_ms, "project_ms": r.project_ms, "frame_ms": r.frame_ms,
                     "drawn_cells": r.cells, "fragments": r.fragments, "tetrahedra_per_s": r.rate(tetrahedra),
                 })
             })
@@ -179,8 +180,8 @@ fn draw(variant: Variant, frames: u32, renderer: &mut Renderer, view: &View, tru
     let (max, rmse) = difference.map_or((f64::INFINITY, f64::INFINITY), |d| (d.max, d.rmse));
     let projection = renderer.stats().projection.unwrap_or_default();
     let frame_ms = times[times.len() / 2];
-    let (cells, fragments) = (projection.drawn_cells, projection.fragments);
-    Ok(Row { variant, image, max, rmse, order_ms, frame_ms, cells, fragments })
+    let (cells, fragments, project_ms) = (projection.drawn_cells, projection.fragments, projection.project_ms);
+    Ok(Row { variant, image, max, rmse, order_ms, project_ms, frame_ms, cells, fragments })
 }
 
 impl Row {
@@ -192,8 +193,8 @@ impl Row {
 
 fn table(rows: &[Row], tetrahedra: u64) -> String {
     let mut text = format!(
-        "{:24} {:>9} {:>9} {:>10} {:>10} {:>9} {:>10}  {}\n",
-        "variant", "max", "rmse", "order ms", "frame ms", "tets/s", "fragm./s", "as in"
+        "{:24} {:>9} {:>9} {:>10} {:>10} {:>10} {:>9} {:>10}  {}\n",
+        "variant", "max", "rmse", "order ms", "project ms", "frame ms", "tets/s", "fragm./s", "as in"
     );
     for r in rows {
         let fragments = match r.fragments {
@@ -201,11 +202,12 @@ fn table(rows: &[Row], tetrahedra: u64) -> String {
             None => "-".into(),
         };
         text += &format!(
-            "{:24} {:>9.1e} {:>9.1e} {:>10.1} {:>10.1} {:>7.0} k {:>10}  {}\n",
+            "{:24} {:>9.1e} {:>9.1e} {:>10.1} {:>10} {:>10.1} {:>7.0} k {:>10}  {}\n",
             r.variant.name,
             r.max,
             r.rmse,
             r.order_ms,
+            r.project_ms.map_or("-".into(), |ms| format!("{ms:.1}")),
             r.frame_ms,
             r.rate(tetrahedra) / 1e3,
             fragments,
