@@ -126,7 +126,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
             match draw(variant, options.frames, &mut renderer, &view, &truth) {
                 Ok(row) => rows.push(row),
                 // A variant that the device or the field rules out is no reason to keep the others back.
-                Err(e) => tracing::warn!("{name}: {e}"),
+                Err(e) => tracing::warn!("{name}: {}", e.to_string().replace('\n', " ")),
             }
         }
     });
