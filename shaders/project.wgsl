@@ -25,11 +25,9 @@ struct Frame {
     /// 1 in perspective views, 0 in parallel ones.
     perspective: u32,
     planes: u32,
-    /// Whether `ends` holds a value for each pixel of the image.
-    has_ends: u32,
-    /// The cells and parts of cells of a whole frame.
-    records: u32,
-    unused: u32,
+    unused_a: u32,
+    unused_b: u32,
+    unused_c: u32,
 }
 
 @group(0) @binding(3) var<uniform> frame: Frame;
@@ -63,8 +61,11 @@ fn origin_at(xy: vec2f) -> vec3f {
 /// directions are `stretch` lengths.
 fn limits_of(at: vec2f, origin: vec3f, along: vec3f, stretch: f32) -> vec2f {
     var limits = vec2f(frame.near, frame.far) * stretch;
-    if frame.has_ends != 0u {
+    if HAS_ENDS {
         limits.y = min(limits.y, ends[u32(at.y) * u32(frame.size.x) + u32(at.x)]);
+    }
+    if !HAS_PLANES {
+        return limits;
     }
     for (var k = 0u; k < frame.planes; k++) {
         let height = dot(origin, planes[k].xyz) + planes[k].w;

@@ -85,7 +85,7 @@ fn key_of(cell: u32) -> u32 {
         || all(w <= vec4f(0.0)) || all(z < vec4f(frame.near)) || all(z > vec4f(frame.far)) {
         return HIDDEN;
     }
-    for (var k = 0u; k < frame.planes; k++) {
+    for (var k = 0u; HAS_PLANES && k < frame.planes; k++) {
         let n = planes[k].xyz;
         if all(vec4f(dot(p[0], n), dot(p[1], n), dot(p[2], n), dot(p[3], n)) + planes[k].w < vec4f(0.0)) {
             return HIDDEN;

@@ -34,7 +34,7 @@ fn pixel_of(p: vec3f) -> vec2f {
 }
 
 /// 1/w, or depth in a parallel view.
-fn depth_of(p: vec3f) -> f32 {
+fn reach_of(p: vec3f) -> f32 {
     let along = dot(p, frame.forward.xyz);
     return select(along, 1.0 / (along + frame.forward.w), frame.perspective == 1u);
 }
@@ -153,8 +153,8 @@ fn record_of(corners: array<vec3f, 4>, values: array<Value, 4>, piece: u32, rank
     }
     let front = p[0] + edges[0] * one.y + edges[1] * one.z + edges[2] * one.w;
     let back = p[0] + edges[0] * other.y + edges[1] * other.z + edges[2] * other.w;
-    let front_depth = depth_of(front);
-    let back_depth = depth_of(back);
+    let front_depth = reach_of(front);
+    let back_depth = reach_of(back);
     let deeper = abs(dot(apart, frame.forward.xyz));
     let difference = select(deeper, deeper * front_depth * back_depth, frame.perspective == 1u);
     let inside = seen(front + (back - front) * 0.5);
@@ -166,7 +166,7 @@ fn record_of(corners: array<vec3f, 4>, values: array<Value, 4>, piece: u32, rank
         pixel_of(inside),
         rank,
         longest,
-        array<f32, 4>(depth_of(p[around.x]), depth_of(p[around.y]), depth_of(p[around.z]), depth_of(p[around.w])),
+        array<f32, 4>(reach_of(p[around.x]), reach_of(p[around.y]), reach_of(p[around.z]), reach_of(p[around.w])),
         front_depth,
         back_depth,
         difference,

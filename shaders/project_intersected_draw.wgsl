@@ -33,6 +33,21 @@ fn vertex(@builtin(vertex_index) index: u32) -> Drawn {
     return drawn;
 }
 
+/// A corner in the coordinates of the ray. Places of one cell need not be told as those of a whole walk: they are relative to the
+/// frame's base, and lengths come from volumes.
+fn placed(ray: Ray, p: vec3f) -> vec4f {
+    let q = p - ray.origin.high;
+    let x = dot_fma(q, ray.right);
+    let y = dot_fma(q, ray.up);
+    return vec4f(select(x, 0.0, abs(x) < TINY), select(y, 0.0, abs(y) < TINY), dot_fma(q, ray.along), 0.0);
+}
+
+/// As `is_left`: the sign of an area that keeps what its rounding left is exact, and needs no digits of integers, which
+/// drivers that take both ways of a decision would always count out.
+fn is_left_of(a: vec4f, b: vec4f, twice: f32) -> bool {
+    return select(twice > 0.0, select(b.x > a.x, a.y > b.y, a.y != b.y), twice == 0.0);
+}
+
 /// Weights of the four corners where the ray meets the face whose own are not 0.
 fn share(areas: vec4f) -> vec4f {
     let sum = areas.x + areas.y + areas.z + areas.w;
@@ -45,22 +60,22 @@ fn fragment(drawn: Drawn) -> @location(0) vec4f {
     let direction = direction_at(xy);
     let stretch = length(direction);
     let ray = ray_along(single(origin_at(xy)), single(direction / stretch));
-    let a = project(ray, single(drawn.a.xyz));
-    let b = project(ray, single(drawn.b.xyz));
-    let c = project(ray, single(drawn.c.xyz));
-    let d = project(ray, single(drawn.d.xyz));
+    let a = placed(ray, drawn.a.xyz);
+    let b = placed(ray, drawn.b.xyz);
+    let c = placed(ray, drawn.c.xyz);
+    let d = placed(ray, drawn.d.xyz);
     let ab = area(a, b);
     let ac = area(a, c);
     let ad = area(a, d);
     let bc = area(b, c);
     let bd = area(b, d);
     let cd = area(c, d);
-    let left_ab = is_left(a, b, ab);
-    let left_ac = is_left(a, c, ac);
-    let left_ad = is_left(a, d, ad);
-    let left_bc = is_left(b, c, bc);
-    let left_bd = is_left(b, d, bd);
-    let left_cd = is_left(c, d, cd);
+    let left_ab = is_left_of(a, b, ab);
+    let left_ac = is_left_of(a, c, ac);
+    let left_ad = is_left_of(a, d, ad);
+    let left_bc = is_left_of(b, c, bc);
+    let left_bd = is_left_of(b, d, bd);
+    let left_cd = is_left_of(c, d, cd);
     // Whether the ray passes through the face opposite to each corner: two of them, or none.
     let through = vec4<bool>(
         left_bc == left_cd && left_bc != left_bd,
@@ -79,7 +94,7 @@ fn fragment(drawn: Drawn) -> @location(0) vec4f {
     let last_areas = select(select(select(opposite_a, opposite_b, through.y), opposite_c, through.z), opposite_d, through.w);
     let first_weights = share(first_areas);
     let last_weights = share(last_areas);
-    let depths = vec4f(a.z + a.w, b.z + b.w, c.z + c.w, d.z + d.w);
+    let depths = vec4f(a.z, b.z, c.z, d.z);
     let first_t = dot(first_weights, depths);
     let last_t = dot(last_weights, depths);
     // The corner that the first face lacks is this far from it along the ray; the last one is at its share of that.

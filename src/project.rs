@@ -158,9 +158,9 @@ pub enum Texels {
 pub(crate) struct Counts {
     /// Cells and parts of cells that were drawn.
     pub(crate) records: u64,
-    /// From the start of the frame until the order was known; 0 where it was known before.
+    /// Finding the cells that are seen and sorting them; 0 where the order was known.
     pub(crate) order_ms: f64,
-    /// By the device's own clock, where it has one: projecting all cells of the order, and drawing them.
+    /// By the device's own clock, where it has one, or in software the host's: projecting all cells of the order, and drawing them.
     pub(crate) project_ms: Option<f64>,
     pub(crate) draw_ms: Option<f64>,
     /// Fragments that were computed, where the device counts them.

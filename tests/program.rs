@@ -247,3 +247,23 @@ fn the_demo_shows_something() {
     colors.dedup();
     assert!(colors.len() > 1000, "{} colours", colors.len());
 }
+
+#[test]
+fn variants_of_the_projection_engine() {
+    let place = Place::new();
+    place.misused("render cube.vtu --out a.png --engine project --fragments round", "round");
+    place.misused("render cube.vtu --out a.png --engine project --table 4x4", "--table");
+    let Ran(code, out, err) = place.run("study cube.vtu --out sheet.png --json study.json --frames 1 --size 24x16");
+    if code == Some(1) && err.contains("graphics device") && std::env::var_os("HALITE_REQUIRE_GPU").is_none() {
+        return;
+    }
+    assert_eq!((code, err.as_str()), (Some(0), ""));
+    assert!(out.contains("intersected, exact") && out.contains("alpha dithering"), "{out}");
+    let study: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(place.path("study.json")).unwrap()).unwrap();
+    let variants = study["variants"].as_array().unwrap();
+    let exact = variants.iter().find(|v| v["variant"] == "intersected, exact").unwrap();
+    assert!(variants.len() > 12 && exact["rmse"].as_f64().unwrap() < 1e-2, "{study}");
+    let sheet = std::fs::read(place.path("sheet.png")).unwrap();
+    assert!(sheet.len() > 1000 && sheet.starts_with(b"\x89PNG"));
+}

@@ -79,7 +79,7 @@ fn one_colour_needs_no_order() {
                 let expected = Engine::Reference.image(&scene, &view);
                 set(&mut renderer, &scene);
                 let got = image(&mut renderer, Switches::default(), &view);
-                report.hold(&case, &got, &expected, 2e-4);
+                report.hold(&case, &got, &expected, 5e-5);
             }
         }
     }
@@ -137,6 +137,14 @@ fn thin() -> (Scene, View) {
     (scene, perspective(dvec3(1.0, 2.0, 5.0), 25.0))
 }
 
+/// The same, so faint that most of a cell is less than what 8 bits can tell; white, so that colours are rounded as opacities are.
+fn faint() -> (Scene, View) {
+    let (mut scene, view) = thin();
+    let [lo, hi] = scene.field.range(0);
+    scene.transfer = TransferFunction::new(vec![(0.0, [1.0; 3])], vec![(lo, 0.01), (hi, 0.04)], 1.0).unwrap();
+    (scene, view)
+}
+
 /// Two parts with a gap, a tunnel, a cavity and bays, in colours that tell which hides which.
 fn holes() -> (Scene, View) {
     let mesh = generate::islands(10);
@@ -183,7 +191,8 @@ fn more_bits_cure_the_table() {
         "8 bits {eight:.1e}, 16 {sixteen:.1e}, float {float:.1e}; as published {published_eight:.1e}, {published_sixteen:.1e}"
     );
     assert!(eight > 10.0 * sixteen && float < 2.0 * sixteen && sixteen < 2e-4);
-    assert!(published_eight > 1.5 * published_sixteen);
+    // The bias of the published table is greater than what 8 bits add to it.
+    assert!(published_eight > published_sixteen);
 }
 
 #[test]
@@ -198,7 +207,7 @@ fn logarithmic_lengths_cure_uniform_ones() {
 #[test]
 fn floats_and_dithering_cure_8_bits() {
     let Some(mut renderer) = renderer() else { return };
-    let (scene, view) = thin();
+    let (scene, view) = faint();
     set(&mut renderer, &scene);
     let expected = Engine::Reference.image(&scene, &view);
     let eight = Switches { target: Target::Rgba8, ..Switches::default() };
@@ -211,7 +220,7 @@ fn floats_and_dithering_cure_8_bits() {
     let [plain, dithered, half, float] =
         variants.map(|s| rmse(&blurred(&image(&mut renderer, s, &view)), &blurred(&expected)));
     eprintln!("8 bits {plain:.1e}, dithered {dithered:.1e}, 16-bit floats {half:.1e}, floats {float:.1e}");
-    assert!(plain > 3.0 * dithered && dithered > half && half > 5.0 * float && float < 1e-5);
+    assert!(plain > 3.0 * dithered && plain > 10.0 * half && half > 5.0 * float && float < 1e-5);
 
     // Cells that only add up dither their colours.
     let additive = |s| Switches { compositing: Compositing::Additive, ..s };

@@ -37,8 +37,7 @@ pub(super) struct Frame {
     nearest: f32,
     perspective: u32,
     planes: u32,
-    has_ends: u32,
-    unused: [u32; 2],
+    unused: [u32; 3],
 }
 
 /// A view as the shaders see it.
@@ -49,7 +48,18 @@ pub(super) struct Seen {
     pub(super) ends: Vec<f32>,
 }
 
+/// What of the limits of rays there is: shaders are compiled without the others.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Limits {
+    pub(super) ends: bool,
+    pub(super) planes: bool,
+}
+
 impl Seen {
+    pub(super) fn limits(&self) -> Limits {
+        Limits { ends: !self.ends.is_empty(), planes: !self.planes.is_empty() }
+    }
+
     pub(super) fn new(geometry: &Geometry, view: &View) -> Self {
         let fan = view.fan(geometry.centre, geometry.scale, NEAR_EYE);
         let base = fan.origin[0];
@@ -83,8 +93,7 @@ impl Seen {
             nearest: (fan.near + fan.ahead).max(NEAREST) as f32,
             perspective: u32::from(perspective),
             planes: planes.len() as u32,
-            has_ends: u32::from(!ends.is_empty()),
-            unused: [0; 2],
+            unused: [0; 3],
         };
         Seen { frame, planes, ends }
     }

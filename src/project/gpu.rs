@@ -4,7 +4,7 @@
 //! 2. These are sorted.
 //! 3. Batch by batch, in that order, `project` (compute) makes a record of each cell, and the records are drawn.
 
-use super::frame::{FAR, FILLED, Frame, Seen, filled};
+use super::frame::{FAR, FILLED, Frame, Limits, Seen, filled};
 use super::{Coloring, Compositing, Counts, Fragments, Order, Switches, Target, Texels, Thickness};
 use crate::error::{Error, Result};
 use crate::gpu::buffers::{Buffer, Chunks};
@@ -273,7 +273,6 @@ impl Project {
         view: &View,
         switches: &Switches,
     ) -> Result<(Vec<[f32; 4]>, Counts)> {
-        let start = Instant::now();
         if view.blend() == Blend::Maximum {
             let what = "the projection engine does not draw the maximum along rays; the engine \"traverse\" does";
             return Err(Error::View(what.into()));
@@ -287,12 +286,15 @@ impl Project {
             Values::Cell(_) => "CELL",
         };
         let arrays = self.arrays::<N>()?;
-        self.compile(&arrays, association, exact, switches, format)?;
-        self.prepare_canvas::<N>(switches.fragments, view.size(), format)?;
         let seen = Seen::new(geometry, view);
+        let variant = Variant { kind: exact.kind, direct: exact.direct };
+        let source = program(&variant, association, switches, seen.limits(), &arrays);
+        self.compile(&arrays, source, switches.compositing, format)?;
+        self.prepare_canvas::<N>(switches.fragments, view.size(), format)?;
         let frame = Pass::new(self, &seen)?;
         let mut counts = Counts::default();
         if !self.ordered.as_ref().is_some_and(|o| o.holds_for(&seen, switches)) {
+            let start = Instant::now();
             self.ordered = None;
             self.ordered = Some(self.order(&frame, &seen, geometry.cells.len(), switches)?);
             counts.order_ms = start.elapsed().as_secs_f64() * 1e3;
@@ -336,14 +338,10 @@ impl Project {
     fn compile(
         &mut self,
         arrays: &[Array],
-        association: &str,
-        exact: &Exact<f32>,
-        switches: &Switches,
+        source: String,
+        compositing: Compositing,
         format: wgpu::TextureFormat,
     ) -> Result<()> {
-        let variant = Variant { kind: exact.kind, direct: exact.direct };
-        let source = program(&variant, association, switches, arrays);
-        let compositing = switches.compositing;
         let same = |p: &Program| p.source == source && p.format == format && p.compositing == compositing;
         if self.program.as_ref().is_some_and(same) {
             return Ok(());
@@ -566,6 +564,10 @@ impl Project {
 
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         self.clear(&mut encoder, canvas);
+        // Devices in software tell no times of their parts: the host waits for each, which costs them nothing.
+        let is_software = gpu.adapter.kind == "CPU";
+        let (mut project_ms, mut since) = (0.0, Instant::now());
+        let begun = since;
         for (i, &first) in firsts.iter().enumerate() {
             let count = (ordered.entries - first).min(BATCH);
             let slice = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
@@ -587,6 +589,12 @@ impl Project {
                 pass.set_bind_group(2, &own, &[]);
                 pass.dispatch_workgroups(groups[0], groups[1], 1);
             }
+            if is_software {
+                gpu.queue.submit([encoder.finish()]);
+                gpu.wait()?;
+                project_ms += since.elapsed().as_secs_f64() * 1e3;
+                encoder = gpu.device.create_command_encoder(&Default::default());
+            }
             {
                 let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                     label: Some("draw"),
@@ -607,10 +615,18 @@ impl Project {
                     pass.end_pipeline_statistics_query();
                 }
             }
-            if (i + 1) % AT_ONCE == 0 {
+            if is_software || (i + 1) % AT_ONCE == 0 {
                 gpu.queue.submit([encoder.finish()]);
                 encoder = gpu.device.create_command_encoder(&Default::default());
             }
+            if is_software {
+                gpu.wait()?;
+                since = Instant::now();
+            }
+        }
+        if is_software {
+            let all = begun.elapsed().as_secs_f64() * 1e3;
+            (counts.project_ms, counts.draw_ms) = (Some(project_ms), Some(all - project_ms));
         }
         let [w, h] = view.size();
         let row = row_bytes(w, *format);
@@ -637,7 +653,9 @@ impl Project {
                 let period = f64::from(gpu.queue.get_timestamp_period()) / 1e6;
                 let sum =
                     |at: usize| times.chunks(4).map(|t| t[at + 1].saturating_sub(t[at])).sum::<u64>() as f64 * period;
-                (counts.project_ms, counts.draw_ms) = (Some(sum(0)), Some(sum(2)));
+                if !is_software {
+                    (counts.project_ms, counts.draw_ms) = (Some(sum(0)), Some(sum(2)));
+                }
             }
             picture
                 .chunks(row as usize)
@@ -906,7 +924,7 @@ fn pixels(bytes: &[u8], format: wgpu::TextureFormat) -> Vec<[f32; 4]> {
 }
 
 /// The whole program.
-fn program(variant: &Variant, association: &str, switches: &Switches, arrays: &[Array]) -> String {
+fn program(variant: &Variant, association: &str, switches: &Switches, limits: Limits, arrays: &[Array]) -> String {
     let mut text = shader::prelude(variant);
     for (name, value) in [("FAR", f64::from(FAR)), ("SHARP", SHARP), ("GROWTH", GROWTH), ("BESIDE", 1e-6)] {
         text += &format!("const {name} = {value:?}f;\n");
@@ -921,6 +939,8 @@ fn program(variant: &Variant, association: &str, switches: &Switches, arrays: &[
         ("BY_DEPTH", switches.thickness == Thickness::Depth),
         ("DITHERED", switches.dither && switches.target == Target::Rgba8),
         ("ADDITIVE", switches.compositing == Compositing::Additive),
+        ("HAS_ENDS", limits.ends),
+        ("HAS_PLANES", limits.planes),
         ("BY_SPHERE", switches.order == Order::Circumsphere),
     ] {
         text += &format!("const {name} = {value};\n");

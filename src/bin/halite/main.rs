@@ -9,6 +9,7 @@ mod output;
 mod parse;
 mod progress;
 mod render;
+mod study;
 mod variant;
 
 use anyhow::Result;
@@ -36,6 +37,7 @@ enum Command {
     Render(Box<render::Options>),
     Info(info::Options),
     Bench(Box<bench::Options>),
+    Study(Box<study::Options>),
     Demo(demo::Options),
 }
 
@@ -75,6 +77,7 @@ fn run(cli: Cli) -> Result<()> {
             Renderer::with_device(cli.threads, DeviceChoice::Cpu)?.install(|| info::run(&options))
         }
         Command::Bench(options) => bench::run(&options, cli.threads),
+        Command::Study(options) => study::run(&options, cli.threads),
         Command::Demo(options) => demo::run(&options, &mut Renderer::new(cli.threads)?),
     }
 }

@@ -65,7 +65,8 @@ fn every_program_is_valid() {
                         target: Target::Rgba8,
                         ..Switches::default()
                     };
-                    validated(&program(&Variant { kind, direct }, association, &switches, &arrays(chunks)));
+                    let limits = Limits { ends: direct, planes: chunks > 1 };
+                    validated(&program(&Variant { kind, direct }, association, &switches, limits, &arrays(chunks)));
                 }
             }
         }
@@ -77,7 +78,13 @@ fn layouts_match_their_rust_twins() {
     for (kind, components) in KINDS.into_iter().zip([1, 2, 4]) {
         for fragments in FORMS {
             let switches = Switches { fragments, ..Switches::default() };
-            let module = validated(&program(&Variant { kind, direct: false }, "POINT", &switches, &arrays(1)));
+            let module = validated(&program(
+                &Variant { kind, direct: false },
+                "POINT",
+                &switches,
+                Limits::default(),
+                &arrays(1),
+            ));
             let span = |name: &str| {
                 let (_, t) = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name)).unwrap();
                 let naga::TypeInner::Struct { span, .. } = &t.inner else { panic!("{name} is no struct") };

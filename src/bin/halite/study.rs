@@ -1,0 +1,289 @@
+use crate::render::{self, Job, Request};
+use crate::{output, progress};
+use anyhow::{Context, Result};
+use clap::Args;
+use embedded_graphics::mono_font::{MonoTextStyle, ascii::FONT_6X10};
+use embedded_graphics::pixelcolor::Rgb888;
+use embedded_graphics::prelude::{DrawTarget, Drawable, OriginDimensions, Pixel, Point, RgbColor, Size};
+use embedded_graphics::text::{Baseline, Text};
+use halite::gpu::DeviceChoice;
+use halite::image::{Backdrop, Image};
+use halite::project::{Coloring, Fragments, Order, Switches, Target, Texels, Thickness};
+use halite::render::Renderer;
+use halite::view::View;
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Compare the variants of the projection engine in one picture
+///
+/// Draws with each published variant and its cure (Kraus, Qiao & Ebert 2004), and writes a sheet of all pictures, each above
+/// its difference from the traverse engine's, with error and time.
+#[derive(Args)]
+pub(crate) struct Options {
+    #[command(flatten)]
+    request: Request,
+    /// The sheet: .png
+    #[arg(short, long, value_name = "FILE")]
+    out: PathBuf,
+    /// Frames drawn with each variant, besides the first; times are medians
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    frames: u32,
+    /// How much differences are magnified
+    #[arg(long, value_name = "GAIN", default_value_t = 10.0)]
+    gain: f32,
+    /// Write errors and times as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// A variant, what it is called, and the published figure or table that it stands in.
+struct Variant {
+    name: &'static str,
+    place: &'static str,
+    switches: Switches,
+}
+
+/// What a variant gave.
+struct Row {
+    variant: Variant,
+    image: Image,
+    max: f64,
+    rmse: f64,
+    order_ms: f64,
+    project_ms: Option<f64>,
+    /// A frame with a camera that stands still: projecting and drawing.
+    frame_ms: f64,
+    cells: u64,
+    fragments: Option<u64>,
+}
+
+/// Pictures next to each other on a sheet, and the widest of them, in pixels.
+const COLUMNS: usize = 5;
+const WIDEST: u32 = 256;
+
+/// Around a picture, and the height of its two lines of text.
+const MARGIN: usize = 6;
+const LINES: usize = 24;
+
+/// From the fewest enhancements to the most, then what else can be switched.
+fn variants() -> Vec<Variant> {
+    let best = Switches::default();
+    let published =
+        Switches { fragments: Fragments::Interpolated, coloring: Coloring::Log, texels: Texels::Unorm16, ..best };
+    let basic = Switches {
+        fragments: Fragments::Linear,
+        coloring: Coloring::Uniform,
+        texels: Texels::Unorm8,
+        target: Target::Rgba8,
+        ..best
+    };
+    let frame_buffer = Switches { target: Target::Rgba8, ..published };
+    let interpolated = Switches { fragments: Fragments::Interpolated, ..best };
+    let variant = |name, place, switches| Variant { name, place, switches };
+    vec![
+        variant("basic", "table 1 i", basic),
+        variant("+ perspective", "table 1 ii", Switches { fragments: Fragments::Interpolated, ..basic }),
+        variant("+ 16-bit table", "table 1 iii", Switches { coloring: Coloring::Uniform, ..frame_buffer }),
+        variant("+ logarithmic", "table 1 iv, figure 9a", frame_buffer),
+        variant("+ alpha dithering", "table 1, figure 9b", Switches { dither: true, ..frame_buffer }),
+        variant("+ 32-bit float target", "table 1, figures 7c 8b 9c 10b", published),
+        variant("16-bit float target", "", Switches { target: Target::Rgba16float, ..published }),
+        variant("8-bit table", "figure 7a", Switches { texels: Texels::Unorm8, ..published }),
+        variant("8-bit target", "figure 7b", frame_buffer),
+        variant("screen-linear", "figure 8a", Switches { fragments: Fragments::Linear, ..published }),
+        variant("thickness by depth", "", Switches { thickness: Thickness::Depth, ..published }),
+        variant("uniform thickness", "figure 10a", Switches { coloring: Coloring::Uniform, ..published }),
+        variant("log-normalised, float", "", Switches { coloring: Coloring::LogNormalised, ..interpolated }),
+        variant("interpolated, exact", "", interpolated),
+        variant("intersected, exact", "", best),
+        variant("by circumspheres", "", Switches { order: Order::Circumsphere, ..best }),
+        variant("not sorted", "", Switches { order: Order::None, ..best }),
+    ]
+}
+
+pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
+    output::check_picture(&options.out)?;
+    if let Some(path) = &options.json {
+        output::check(path)?;
+    }
+    let given = options.request.scene()?;
+    let device = options.request.device(given.as_ref());
+    let mut judge = Renderer::with_device(threads, DeviceChoice::Cpu)?;
+    let job = judge.install(|| render::prepare(&options.request, given))?;
+    let (view, _) = job.scene.view()?;
+    let mut renderer = Renderer::with_engine(threads, device, halite::render::Engine::Project)?;
+    let truth = progress::during("judging", |p| {
+        set(&mut judge, &job)?;
+        judge.render(&view, p)
+    })?;
+    set(&mut renderer, &job)?;
+    let all = variants();
+    let (count, mut rows) = (all.len() as f64, Vec::new());
+    progress::during("drawing", |p| {
+        for (i, variant) in all.into_iter().enumerate() {
+            p(i as f64 / count);
+            let name = variant.name;
+            match draw(variant, options.frames, &mut renderer, &view, &truth) {
+                Ok(row) => rows.push(row),
+                // A variant that the device or the field rules out is no reason to keep the others back.
+                Err(e) => tracing::warn!("{name}: {}", e.to_string().replace('\n', " ")),
+            }
+        }
+    });
+    let tetrahedra = renderer.stats().tetrahedra;
+    output::print(&table(&rows, tetrahedra))?;
+    let background = job.scene.background.unwrap_or_default().map(|c| c as f32);
+    sheet(&rows, &truth, background, options.gain).save(&options.out, Backdrop::Color(background))?;
+    if let Some(path) = &options.json {
+        let stats = renderer.stats();
+        let rows: Vec<_> = rows
+            .iter()
+            .map(|r| {
+                json!({
+                    "variant": r.variant.name, "stands_in": r.variant.place, "switches": r.variant.switches,
+                    "max": r.max, "rmse": r.rmse, "order_ms": r.order_ms, "project_ms": r.project_ms, "frame_ms": r.frame_ms,
+                    "drawn_cells": r.cells, "fragments": r.fragments, "tetrahedra_per_s": r.rate(tetrahedra),
+                })
+            })
+            .collect();
+        let whole = json!({
+            "adapter": stats.adapter, "size": job.scene.size, "tetrahedra": tetrahedra, "variants": rows,
+        });
+        std::fs::write(path, format!("{whole:#}\n")).with_context(|| path.display().to_string())?;
+    }
+    Ok(())
+}
+
+fn set(renderer: &mut Renderer, job: &Job) -> halite::Result<()> {
+    renderer.set_mesh(&job.mesh, job.tetrahedra.clone());
+    renderer.set_field(&job.field)?;
+    renderer.set_transfer(&job.scene.transfer);
+    Ok(())
+}
+
+fn draw(variant: Variant, frames: u32, renderer: &mut Renderer, view: &View, truth: &Image) -> halite::Result<Row> {
+    // Whatever the last variant left: each sorts for itself.
+    renderer.set_switches(Switches { order: Order::None, fragments: Fragments::Intersected, ..variant.switches });
+    if variant.switches.order != Order::None {
+        renderer.render(view, &|_| ())?;
+    }
+    renderer.set_switches(variant.switches);
+    let image = renderer.render(view, &|_| ())?;
+    let order_ms = renderer.stats().projection.map_or(0.0, |p| p.order_ms);
+    let mut times = Vec::new();
+    for _ in 0..frames {
+        renderer.render(view, &|_| ())?;
+        times.push(renderer.stats().frame_ms);
+    }
+    times.sort_by(f64::total_cmp);
+    let difference = image.compare(truth);
+    let (max, rmse) = difference.map_or((f64::INFINITY, f64::INFINITY), |d| (d.max, d.rmse));
+    let projection = renderer.stats().projection.unwrap_or_default();
+    let frame_ms = times[times.len() / 2];
+    let (cells, fragments, project_ms) = (projection.drawn_cells, projection.fragments, projection.project_ms);
+    Ok(Row { variant, image, max, rmse, order_ms, project_ms, frame_ms, cells, fragments })
+}
+
+impl Row {
+    /// Tetrahedra of the mesh over the time of a frame whose camera moved, in 1/s.
+    fn rate(&self, tetrahedra: u64) -> f64 {
+        tetrahedra as f64 * 1e3 / (self.order_ms + self.frame_ms)
+    }
+}
+
+fn table(rows: &[Row], tetrahedra: u64) -> String {
+    let mut text = format!(
+        "{:24} {:>9} {:>9} {:>10} {:>10} {:>10} {:>9} {:>10}  {}\n",
+        "variant", "max", "rmse", "order ms", "project ms", "frame ms", "tets/s", "fragm./s", "as in"
+    );
+    for r in rows {
+        let fragments = match r.fragments {
+            Some(n) => format!("{:.1} M", n as f64 / r.frame_ms / 1e3),
+            None => "-".into(),
+        };
+        text += &format!(
+            "{:24} {:>9.1e} {:>9.1e} {:>10.1} {:>10} {:>10.1} {:>7.0} k {:>10}  {}\n",
+            r.variant.name,
+            r.max,
+            r.rmse,
+            r.order_ms,
+            r.project_ms.map_or("-".into(), |ms| format!("{ms:.1}")),
+            r.frame_ms,
+            r.rate(tetrahedra) / 1e3,
+            fragments,
+            r.variant.place
+        );
+    }
+    text
+}
+
+/// All pictures, each above its difference from `truth` times `gain`.
+fn sheet(rows: &[Row], truth: &Image, background: [f32; 3], gain: f32) -> Image {
+    let step = truth.size[0].div_ceil(WIDEST) as usize;
+    let [w, h] = truth.size.map(|n| (n as usize / step).max(1));
+    let (across, down) = (w.max(150) + MARGIN, LINES + 2 * (h + MARGIN));
+    let columns = COLUMNS.min(rows.len() + 1);
+    let size = [columns * across + MARGIN, (rows.len() + 1).div_ceil(columns) * down + MARGIN];
+    let mut sheet = Sheet(Image::new(size.map(|n| n as u32)));
+    sheet.0.pixels.fill([0.2, 0.2, 0.2, 1.0]);
+    let corner = |i: usize| [MARGIN + i % columns * across, MARGIN + i / columns * down];
+    sheet.write(corner(0), ["traverse", "the truth here"]);
+    sheet.put(corner(0), truth, step, background);
+    for (i, row) in rows.iter().enumerate() {
+        let at = corner(i + 1);
+        let figures = format!("{:.1e} {:.1e} {:.0} ms", row.max, row.rmse, row.order_ms + row.frame_ms);
+        sheet.write(at, [row.variant.name, &figures]);
+        sheet.put(at, &row.image, step, background);
+        if let Some(difference) = row.image.difference(truth, gain) {
+            sheet.put([at[0], at[1] + h + MARGIN], &difference, step, [0.0; 3]);
+        }
+    }
+    sheet.0
+}
+
+/// A picture that text can be written on.
+struct Sheet(Image);
+
+impl Sheet {
+    fn write(&mut self, [x, y]: [usize; 2], lines: [&str; 2]) {
+        let style = MonoTextStyle::new(&FONT_6X10, Rgb888::WHITE);
+        for (k, line) in lines.into_iter().enumerate() {
+            let at = Point::new(x as i32, (y + 11 * k) as i32);
+            // Writing on a picture in memory cannot fail.
+            let Ok(_) = Text::with_baseline(line, at, style, Baseline::Top).draw(self);
+        }
+    }
+
+    /// Every `step`-th pixel of `image`, over `background`, below the text at this corner.
+    fn put(&mut self, [x, y]: [usize; 2], image: &Image, step: usize, background: [f32; 3]) {
+        let [w, h] = image.size.map(|n| (n as usize / step).max(1));
+        for (i, j) in (0..h).flat_map(|j| (0..w).map(move |i| (i, j))) {
+            let p = image.pixels[j * step * image.size[0] as usize + i * step];
+            let [r, g, b] = [0, 1, 2].map(|k| p[k] + (1.0 - p[3]) * background[k]);
+            let at = (y + LINES + j) * self.0.size[0] as usize + x + i;
+            self.0.pixels[at] = [r, g, b, 1.0];
+        }
+    }
+}
+
+impl OriginDimensions for Sheet {
+    fn size(&self) -> Size {
+        Size::new(self.0.size[0], self.0.size[1])
+    }
+}
+
+impl DrawTarget for Sheet {
+    type Color = Rgb888;
+    type Error = std::convert::Infallible;
+
+    fn draw_iter<I: IntoIterator<Item = Pixel<Rgb888>>>(&mut self, pixels: I) -> Result<(), Self::Error> {
+        let [w, h] = self.0.size;
+        for Pixel(Point { x, y }, color) in pixels {
+            if (0..w as i32).contains(&x) && (0..h as i32).contains(&y) {
+                let [r, g, b] = [color.r(), color.g(), color.b()].map(|c| f32::from(c) / 255.0);
+                self.0.pixels[y as usize * w as usize + x as usize] = [r, g, b, 1.0];
+            }
+        }
+        Ok(())
+    }
+}
