@@ -113,7 +113,7 @@ impl Cells {
 }
 
 /// VTK's cell type of a polyhedron.
-pub(crate) const POLYHEDRON: u8 = 42;
+pub const POLYHEDRON: u8 = 42;
 
 /// The faces of the polyhedra among the cells of a mesh.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -355,7 +355,9 @@ fn adaptive(f: &impl Fn(f64) -> [f64; 3], a: f64, b: f64, whole: [f64; 3], halvi
     let middle = (a + b) / 2.0;
     let (left, right) = (gauss(f, a, middle), gauss(f, middle, b));
     let sum: [f64; 3] = std::array::from_fn(|k| left[k] + right[k]);
-    if halvings == 0 || (0..3).all(|k| (sum[k] - whole[k]).abs() <= 1e-13) {
+    // What is NaN never agrees.
+    let open = (0..3).any(|k| (sum[k] - whole[k]).abs() > 1e-13);
+    if halvings == 0 || !open {
         return sum;
     }
     let (left, right) = (adaptive(f, a, middle, left, halvings - 1), adaptive(f, middle, b, right, halvings - 1));

@@ -587,6 +587,16 @@ fn degenerate_polyhedra_are_harmless() {
     assert_eq!(Tetrahedra::new(&bare).unwrap().skipped.unsupported[&42], 1);
 }
 
+/// GetFEM writes triquadratic hexahedra without the point in their middle.
+#[test]
+fn hexahedra_without_their_middle() {
+    let mut points = KINDS[4].points(|p| p);
+    points.pop();
+    let cut = Cut::new(&one(29, points));
+    assert!(near(cut.volumes().iter().sum(), 1.0) && cut.tetrahedra.added.len() == 1);
+    assert_eq!(cut.points[26], DVec3::splat(0.5));
+}
+
 #[test]
 fn cells_that_cannot_be_what_they_say() {
     let told = |vtk_type: u8, n: usize, part: &str| {

@@ -165,10 +165,11 @@ fn skip_field_data(bytes: &mut Vec<u8>) {
         }
     }
     // Up to the next keyword; a description of the arrays may be in between.
-    if let Some(points) = bytes[at..].windows(7).position(|w| w.eq_ignore_ascii_case(b"\nPOINTS")) {
-        let between = String::from_utf8_lossy(&bytes[at..at + points]).into_owned();
+    if let Some(points) = bytes[at - 1..].windows(7).position(|w| w.eq_ignore_ascii_case(b"\nPOINTS")) {
+        let points = at - 1 + points;
+        let between = String::from_utf8_lossy(&bytes[at..points.max(at)]).into_owned();
         if between.trim().is_empty() || between.trim_start().starts_with("METADATA") {
-            bytes.drain(start..=at + points);
+            bytes.drain(start..=points);
         }
     }
 }

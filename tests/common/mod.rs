@@ -11,6 +11,7 @@
 pub(crate) mod draw;
 
 use halite::field::{Association, Component, Field};
+use halite::gpu::DeviceChoice;
 use halite::image::{Backdrop, Image};
 use halite::mesh::cells::Tetrahedra;
 use halite::mesh::{Array, Mesh};
@@ -70,7 +71,7 @@ impl Engine {
         let Scene { mesh, tetrahedra, field, transfer } = scene;
         match self {
             Engine::Twin { threads } => {
-                let mut renderer = Renderer::new(threads).unwrap();
+                let mut renderer = Renderer::with_device(threads, DeviceChoice::Cpu).unwrap();
                 renderer.set_mesh(mesh, tetrahedra.clone());
                 renderer.set_field(field).unwrap();
                 renderer.set_transfer(transfer);

@@ -1,0 +1,172 @@
+"""files.py write FOLDER: files of all kinds, written by VTK. files.py dump OUT FILE...: what VTK reads from them.
+
+Needs VTK 9 and nothing else. A dump is one file: lines of text, each followed by as many bytes as it says."""
+import os, sys
+import vtk
+
+SIZES = {2: "i1", 15: "i1", 3: "u1", 4: "i2", 5: "u2", 6: "i4", 7: "u4", 8: "i8", 9: "u8", 10: "f4", 11: "f8", 12: "i8", 16: "i8", 17: "u8"}
+
+
+def numbers(array):
+    """Kind and bytes of an array."""
+    kind = SIZES[array.GetDataType()]
+    if kind[0] != "f" and int(kind[1]) != array.GetDataTypeSize():
+        kind = kind[0] + str(array.GetDataTypeSize())
+    return kind, bytes(memoryview(array)) if array.GetNumberOfValues() else b""
+
+
+def reader_of(path):
+    with open(path, "rb") as file:
+        start = file.read(200)
+    if start.lower().startswith(b"# vtk datafile"):
+        return vtk.vtkUnstructuredGridReader()
+    return vtk.vtkXMLPUnstructuredGridReader() if path.endswith(".pvtu") else vtk.vtkXMLUnstructuredGridReader()
+
+
+def dump(out, path):
+    def put(words, data=b""):
+        out.write((" ".join(str(w) for w in words) + " " + str(len(data)) + "\n").encode() + data)
+
+    put(["file"], os.fsencode(path))
+    reader = reader_of(path)
+    errors = []
+    reader.AddObserver("ErrorEvent", lambda *_: errors.append(1))
+    reader.SetFileName(path)
+    if reader.IsA("vtkUnstructuredGridReader"):
+        for what in ("Scalars", "Vectors", "Normals", "Tensors", "ColorScalars", "TCoords", "Fields"):
+            getattr(reader, "ReadAll" + what + "On")()
+    reader.Update()
+    grid = reader.GetOutput()
+    if errors:
+        return put(["error"])
+    points = grid.GetPoints()
+    if points is not None and points.GetNumberOfPoints():
+        kind, data = numbers(points.GetData())
+        put(["points", kind], data)
+    cells = grid.GetCells()
+    ids, types, ends, faces = vtk.vtkIdList(), vtk.vtkUnsignedCharArray(), vtk.vtkIdTypeArray(), vtk.vtkIdTypeArray()
+    connectivity = vtk.vtkIdTypeArray()
+    for c in range(grid.GetNumberOfCells()):
+        vtk_type = grid.GetCellType(c)
+        types.InsertNextValue(vtk_type)
+        cells.GetCellAtId(c, ids)
+        for i in range(ids.GetNumberOfIds()):
+            connectivity.InsertNextValue(ids.GetId(i))
+        ends.InsertNextValue(connectivity.GetNumberOfValues())
+        if vtk_type == 42:
+            grid.GetFaceStream(c, ids)
+            for i in range(ids.GetNumberOfIds()):
+                faces.InsertNextValue(ids.GetId(i))
+    for name, array in (("types", types), ("ends", ends), ("connectivity", connectivity), ("faces", faces)):
+        put([name], numbers(array)[1])
+    for name, data in (("point", grid.GetPointData()), ("cell", grid.GetCellData())):
+        for i in range(data.GetNumberOfArrays()):
+            array = data.GetArray(i)
+            if array is not None and array.GetName() and array.GetDataType() in SIZES:
+                kind, values = numbers(array)
+                put([name, kind, array.GetNumberOfComponents()], array.GetName().encode())
+                put(["values"], values)
+    put(["end"])
+
+
+def grid_of(kinds, polyhedra=False):
+    """One cell of each kind, side by side, with arrays of all number types."""
+    grid, points = vtk.vtkUnstructuredGrid(), vtk.vtkPoints()
+    points.SetDataTypeToDouble()
+    cells = []
+    for n, (vtk_type, order) in enumerate(kinds):
+        source = vtk.vtkCellTypeSource()
+        source.SetCellType(vtk_type)
+        source.SetCellOrder(order)
+        source.SetBlocksDimensions(1, 1, 1)
+        source.Update()
+        block = source.GetOutput()
+        first = points.GetNumberOfPoints()
+        for p in range(block.GetNumberOfPoints()):
+            x, y, z = block.GetPoint(p)
+            points.InsertNextPoint(x + 2 * n, y / 3, z * 1e-3)
+        for c in range(block.GetNumberOfCells()):
+            ids = block.GetCell(c).GetPointIds()
+            cells.append((vtk_type, [first + ids.GetId(i) for i in range(ids.GetNumberOfIds())]))
+    if polyhedra:
+        first = points.GetNumberOfPoints()
+        for z in (0, 1):
+            for x, y in ((0, 0), (2, 0), (3, 1), (1, 2), (0, 1)):
+                points.InsertNextPoint(x - 9, y, z)
+        faces = [[4, 3, 2, 1, 0], [5, 6, 7, 8, 9]] + [[i, (i + 1) % 5, 5 + (i + 1) % 5, 5 + i] for i in range(5)]
+        cells.append((42, [[first + i for i in face] for face in faces]))
+    grid.SetPoints(points)
+    grid.Allocate(len(cells))
+    for vtk_type, ids in cells:
+        ids_list = vtk.vtkIdList()
+        if vtk_type == 42:
+            ids_list.InsertNextId(len(ids))
+            for face in ids:
+                ids_list.InsertNextId(len(face))
+                for i in face:
+                    ids_list.InsertNextId(i)
+        else:
+            for i in ids:
+                ids_list.InsertNextId(i)
+        grid.InsertNextCell(vtk_type, ids_list)
+    for data, count in ((grid.GetPointData(), grid.GetNumberOfPoints()), (grid.GetCellData(), grid.GetNumberOfCells())):
+        for name in ("SignedChar", "UnsignedChar", "Short", "UnsignedShort", "Int", "UnsignedInt", "LongLong", "UnsignedLongLong", "Float", "Double"):
+            array = getattr(vtk, "vtk" + name + "Array")()
+            array.SetName(name)
+            array.SetNumberOfComponents(3 if name in ("Float", "Short") else 1)
+            array.SetNumberOfTuples(count)
+            for i in range(array.GetNumberOfValues()):
+                array.SetValue(i, (i * 37 % 101) + (0.1 if name in ("Float", "Double") else 0))
+            data.AddArray(array)
+    return grid
+
+
+LINEAR = [(10, 1), (12, 1), (13, 1), (14, 1)]
+CURVED = [(24, 2), (25, 2), (26, 2), (27, 2)] + [(t, o) for t in (71, 72, 73, 78, 79, 80) for o in (1, 2, 3, 5)]
+
+
+def write(folder):
+    grids = {"linear": grid_of(LINEAR), "curved": grid_of(CURVED), "polyhedra": grid_of(LINEAR, True)}
+    compressors = {"none": None, "zlib": "vtkZLibDataCompressor", "lz4": "vtkLZ4DataCompressor", "lzma": "vtkLZMADataCompressor"}
+    for name, grid in grids.items():
+        for mode in ("ascii", "binary", "base64", "raw"):
+            for packed, compressor in compressors.items():
+                for big in (0, 1):
+                    if mode == "ascii" and (compressor or big):
+                        continue
+                    writer = vtk.vtkXMLUnstructuredGridWriter()
+                    writer.SetInputData(grid)
+                    writer.SetFileName(os.path.join(folder, f"{name}_{mode}_{packed}_{big}.vtu"))
+                    getattr(writer, {"ascii": "SetDataModeToAscii", "binary": "SetDataModeToBinary"}.get(mode, "SetDataModeToAppended"))()
+                    writer.SetEncodeAppendedData(mode == "base64")
+                    writer.SetCompressor(getattr(vtk, compressor)() if compressor else None)
+                    if compressor:
+                        writer.SetBlockSize(4096)
+                    (writer.SetByteOrderToBigEndian if big else writer.SetByteOrderToLittleEndian)()
+                    (writer.SetHeaderTypeToUInt64 if big else writer.SetHeaderTypeToUInt32)()
+                    writer.Write()
+        for version in (42, 51):
+            for binary in (0, 1):
+                writer = vtk.vtkUnstructuredGridWriter()
+                writer.SetInputData(grid)
+                writer.SetFileName(os.path.join(folder, f"{name}_{version}_{binary}.vtk"))
+                writer.SetFileVersion(version)
+                (writer.SetFileTypeToBinary if binary else writer.SetFileTypeToASCII)()
+                writer.Write()
+        writer = vtk.vtkXMLPUnstructuredGridWriter()
+        writer.SetInputData(grid)
+        writer.SetFileName(os.path.join(folder, f"{name}.pvtu"))
+        writer.SetNumberOfPieces(3)
+        writer.SetStartPiece(0)
+        writer.SetEndPiece(2)
+        writer.Write()
+
+
+if __name__ == "__main__":
+    vtk.vtkObject.GlobalWarningDisplayOff()
+    if sys.argv[1] == "write":
+        write(sys.argv[2])
+    else:
+        with open(sys.argv[2], "wb") as out:
+            for path in sys.argv[3:]:
+                dump(out, path)
