@@ -20,4 +20,12 @@ run("${CMAKE_COMMAND}" --build "${FOLDER}/build")
 run("${FOLDER}/build/without_vtk" "${MESH}" "${FOLDER}/cube.png" s)
 if (WITH_VTK)
   run(${DISPLAY} "${FOLDER}/build/with_vtk")
+  # The autoload folder and the Python package find their libraries where they were installed.
+  if (PYTHON)
+    set(ask "from vtkmodules import vtkRenderingVolumeOpenGL2, vtkRenderingVolume as v"
+      "assert v.vtkProjectedTetrahedraMapper().GetClassName() == 'vtkHaliteMapper'")
+    string(REPLACE ";" "\n" ask "${ask}")
+    run("${CMAKE_COMMAND}" -E env "VTK_AUTOLOAD_PATH=${FOLDER}/prefix/${LIBDIR}/halite-autoload" "${PYTHON}" -c "${ask}")
+    run("${CMAKE_COMMAND}" -E env "PYTHONPATH=${FOLDER}/prefix/${PYTHON_PATH}" "${PYTHON}" -c "import halite\n${ask}")
+  endif ()
 endif ()

@@ -187,9 +187,10 @@ struct vtkHaliteMapper::Internals
   std::map<vtkVolumeProperty*, Knots> Functions;
   std::list<Frame> Frames;
   std::list<Presenter> Presenters;
-  // What failed, and for what: nothing is tried, or said, twice.
+  // What failed since something was drawn, and for what: nothing is tried, or said, twice.
   Key Failed;
-  std::set<std::string> Said;
+  std::set<std::string> Errors;
+  std::set<std::string> Remarks;
   std::vector<float> Pixels;
   std::string Adapter;
 
@@ -240,6 +241,11 @@ struct vtkHaliteMapper::Internals
     sources << static_cast<std::uint64_t>(opacity->GetMTime())
             << static_cast<std::uint64_t>(grey ? greys->GetMTime() : colors->GetMTime())
             << static_cast<std::uint64_t>(rgba);
+    // Properties that are gone leave theirs behind.
+    if (this->Functions.size() > 100)
+    {
+      this->Functions.clear();
+    }
     Knots& knots = this->Functions[property];
     if (knots.Sources != sources)
     {
@@ -501,13 +507,13 @@ void vtkHaliteMapper::Render(vtkRenderer* renderer, vtkVolume* volume)
   this->PrepareTime = this->DepthTime = this->CoreTime = this->PresentTime = 0;
   this->TimeToDraw = 0;
   auto say = [&](const std::string& what) {
-    if (inner.Said.insert(what).second)
+    if (inner.Errors.insert(what).second)
     {
       vtkErrorMacro(<< what);
     }
   };
   auto remark = [&](const char* what) {
-    if (inner.Said.insert(what).second)
+    if (inner.Remarks.insert(what).second)
     {
       vtkWarningMacro(<< what);
     }
@@ -632,6 +638,7 @@ void vtkHaliteMapper::Render(vtkRenderer* renderer, vtkVolume* volume)
       frame.Texture = presenter.Upload(view.width, view.height, inner.Pixels);
     }
     presenter.Present(frame.Texture, viewport);
+    inner.Errors.clear();
   }
   catch (const std::exception& error)
   {
