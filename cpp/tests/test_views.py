@@ -175,6 +175,20 @@ def test_picking_draws_nothing():
     check(pixels(w), before, near=0)
 
 
+def test_depth_peeling_of_volumes():
+    # Projected tetrahedra make the window black. Translucent geometry is behind the volume, as without peeling of volumes.
+    w, r = scene(box(), position=(0.5, 0.5, 5), up=(0, 1, 0))
+    glass = plane(-0.2, (0.2, 0.8, 0.4))
+    glass.GetProperty().SetOpacity(0.5)
+    r.AddActor(glass)
+    r.UseDepthPeelingOn()
+    expected = pixels(w)
+    assert expected.max() > 100
+    r.UseDepthPeelingForVolumesOn()
+    for _ in range(2):
+        check(pixels(w), expected)
+
+
 def test_image_sample_distance():
     v = box(ImageSampleDistance=2.0)
     w, r = scene(v, size=(96, 96))

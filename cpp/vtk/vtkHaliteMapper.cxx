@@ -11,11 +11,13 @@
 #include "vtkColorTransferFunction.h"
 #include "vtkCommand.h"
 #include "vtkDataArray.h"
+#include "vtkInformation.h"
 #include "vtkLogger.h"
 #include "vtkMatrix3x3.h"
 #include "vtkMatrix4x4.h"
 #include "vtkNew.h"
 #include "vtkObjectFactory.h"
+#include "vtkOpenGLActor.h"
 #include "vtkOpenGLCamera.h"
 #include "vtkOpenGLRenderWindow.h"
 #include "vtkPiecewiseFunction.h"
@@ -193,6 +195,15 @@ struct vtkHaliteMapper::Internals
   std::set<std::string> Remarks;
   std::vector<float> Pixels;
   std::string Adapter;
+  // What is to be drawn once a renderer has finished.
+  struct Late
+  {
+    vtkWeakPointer<vtkRenderer> Renderer;
+    vtkWeakPointer<vtkVolume> Volume;
+    unsigned long Observer = 0;
+  };
+  std::list<Late> Lates;
+  bool DrawsLate = false;
 
   Presenter& PresenterOf(vtkOpenGLRenderWindow* window)
   {
@@ -286,6 +297,34 @@ vtkHaliteMapper::~vtkHaliteMapper()
 bool vtkHaliteMapper::IsSupported(vtkRenderWindow* window)
 {
   return vtkOpenGLRenderWindow::SafeDownCast(window) != nullptr;
+}
+
+void vtkHaliteMapper::DrawLate(vtkObject* caller, unsigned long, void*)
+{
+  Internals& inner = *this->Inner;
+  std::list<Internals::Late> due;
+  for (auto late = inner.Lates.begin(); late != inner.Lates.end();)
+  {
+    auto next = std::next(late);
+    if (!late->Renderer || late->Renderer == caller)
+    {
+      due.splice(due.end(), inner.Lates, late);
+    }
+    late = next;
+  }
+  inner.DrawsLate = true;
+  for (const Internals::Late& late : due)
+  {
+    if (late.Renderer)
+    {
+      late.Renderer->RemoveObserver(late.Observer);
+      if (late.Volume)
+      {
+        this->Render(late.Renderer, late.Volume);
+      }
+    }
+  }
+  inner.DrawsLate = false;
 }
 
 void vtkHaliteMapper::PrintSelf(ostream& os, vtkIndent indent)
@@ -530,6 +569,24 @@ void vtkHaliteMapper::Render(vtkRenderer* renderer, vtkVolume* volume)
   {
     return;
   }
+  // Depth peeling asks for every peel. A picture that is drawn whole goes over the finished scene, once.
+  vtkInformation* keys = volume->GetPropertyKeys();
+  if (!inner.DrawsLate && keys && keys->Has(vtkOpenGLActor::GLDepthMaskOverride()) &&
+    keys->Get(vtkOpenGLActor::GLDepthMaskOverride()) < 0)
+  {
+    remark("Halite draws this volume over translucent geometry, not between its layers: depth peeling of volumes is on");
+    const bool waits = std::any_of(inner.Lates.begin(), inner.Lates.end(),
+      [&](const Internals::Late& l) { return l.Renderer == renderer && l.Volume == volume; });
+    if (!waits)
+    {
+      inner.Lates.emplace_back();
+      inner.Lates.back().Renderer = renderer;
+      inner.Lates.back().Volume = volume;
+      inner.Lates.back().Observer = renderer->AddObserver(vtkCommand::EndEvent, this, &vtkHaliteMapper::DrawLate);
+    }
+    return;
+  }
+
   Content content;
   content.Grid = vtkUnstructuredGridBase::SafeDownCast(this->GetInputDataObject(0, 0));
   vtkVolumeProperty* property = volume->GetProperty();

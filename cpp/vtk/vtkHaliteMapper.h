@@ -179,6 +179,11 @@ protected:
   vtkIdType NumberOfFunctionUploads = 0;
   vtkIdType NumberOfCopies = 0;
 
+  /**
+   * Draws what was put off until a renderer has finished.
+   */
+  void DrawLate(vtkObject* caller, unsigned long event, void* data);
+
 private:
   vtkHaliteMapper(const vtkHaliteMapper&) = delete;
   void operator=(const vtkHaliteMapper&) = delete;
