@@ -12,7 +12,7 @@ use crate::field::{Association, Component, Field};
 use crate::host::{Session, guard, keep_log, take_log};
 use crate::image::{Backdrop, Image};
 use crate::mesh::cells::name;
-use crate::mesh::{Array, Cells, Mesh, Values, with_values};
+use crate::mesh::{Array, Cells, Mesh, Polyhedra, Values, with_values};
 use crate::transfer::{Convention, TransferFunction};
 use crate::view::{Blend, Camera, ClippingPlane, DepthBuffer, DepthKind, Projection, View};
 use bridge::{ArrayInfo, CameraSpec, CellCount, FieldSpec, Numbers, Stats, TransferSpec, Type, ViewSpec};
@@ -135,6 +135,7 @@ mod bridge {
 
         fn open_mesh(path: &str, threads: usize) -> Result<Box<Mesh>>;
         fn new_mesh(points: Numbers, types: &[u8], offsets: Numbers, connectivity: Numbers) -> Result<Box<Mesh>>;
+        fn add_polyhedra(mesh: &mut Mesh, cells: Numbers, faces: Numbers, points: Numbers) -> Result<()>;
         fn add_array(mesh: &mut Mesh, name: &str, of_cells: bool, components: usize, numbers: Numbers) -> Result<()>;
         fn arrays(mesh: &Mesh) -> Result<Vec<ArrayInfo>>;
         fn array_values(mesh: &Mesh, index: usize) -> Result<Vec<f64>>;
@@ -180,28 +181,40 @@ fn open_mesh(path: &str, threads: usize) -> Result<Box<Mesh>> {
 
 fn new_mesh(points: Numbers, types: &[u8], offsets: Numbers, connectivity: Numbers) -> Result<Box<Mesh>> {
     guard(|| {
-        let index = |what: &str, numbers: Numbers| -> Result<Vec<u64>> {
-            let negative = || Error::Mesh(format!("{what} are negative, or no integers"));
-            match numbers.kind {
-                Type::I32 => {
-                    cast::<i32>(&numbers)?.par_iter().map(|&i| u64::try_from(i).map_err(|_| negative())).collect()
-                }
-                Type::I64 => {
-                    cast::<i64>(&numbers)?.par_iter().map(|&i| u64::try_from(i).map_err(|_| negative())).collect()
-                }
-                Type::U32 => Ok(cast::<u32>(&numbers)?.iter().map(|&i| u64::from(i)).collect()),
-                Type::U64 => Ok(cast::<u64>(&numbers)?.to_vec()),
-                _ => Err(negative()),
-            }
-        };
-        let narrow = |i: u64| u32::try_from(i).map_err(|_| Error::Mesh(format!("a cell names point {i}")));
-        let connectivity: Vec<u32> = match connectivity.kind {
-            Type::U32 => cast::<u32>(&connectivity)?.to_vec(),
-            _ => index("point indices", connectivity)?.into_par_iter().map(narrow).collect::<Result<_>>()?,
-        };
-        let cells = Cells { types: types.to_vec(), offsets: index("offsets", offsets)?, connectivity };
+        let connectivity = point_ids(connectivity)?;
+        let cells = Cells { types: types.to_vec(), offsets: indices("offsets", offsets)?, connectivity };
         Mesh::new(triples(&points)?, cells, vec![], vec![]).map(Box::new)
     })
+}
+
+fn add_polyhedra(mesh: &mut Mesh, cells: Numbers, faces: Numbers, points: Numbers) -> Result<()> {
+    guard(|| {
+        mesh.set_polyhedra(Polyhedra {
+            cells: indices("starts of cells", cells)?,
+            faces: indices("starts of faces", faces)?,
+            points: point_ids(points)?,
+        })
+    })
+}
+
+/// Integers from 0 on.
+fn indices(what: &str, numbers: Numbers) -> Result<Vec<u64>> {
+    let negative = || Error::Mesh(format!("{what} are negative, or no integers"));
+    match numbers.kind {
+        Type::I32 => cast::<i32>(&numbers)?.par_iter().map(|&i| u64::try_from(i).map_err(|_| negative())).collect(),
+        Type::I64 => cast::<i64>(&numbers)?.par_iter().map(|&i| u64::try_from(i).map_err(|_| negative())).collect(),
+        Type::U32 => Ok(cast::<u32>(&numbers)?.iter().map(|&i| u64::from(i)).collect()),
+        Type::U64 => Ok(cast::<u64>(&numbers)?.to_vec()),
+        _ => Err(negative()),
+    }
+}
+
+fn point_ids(numbers: Numbers) -> Result<Vec<u32>> {
+    let narrow = |i: u64| u32::try_from(i).map_err(|_| Error::Mesh(format!("a cell names point {i}")));
+    match numbers.kind {
+        Type::U32 => Ok(cast::<u32>(&numbers)?.to_vec()),
+        _ => indices("point indices", numbers)?.into_par_iter().map(narrow).collect(),
+    }
 }
 
 fn add_array(mesh: &mut Mesh, name: &str, of_cells: bool, components: usize, numbers: Numbers) -> Result<()> {

@@ -189,7 +189,16 @@ impl Mesh {
     /// # Errors
     /// [`Error::Mesh`] if there are not as many entries as cells need, if they do not start at 0, decrease or pass the end of the
     /// next list, or if a face names a point that does not exist.
-    pub fn with_polyhedra(self, polyhedra: Polyhedra) -> Result<Self> {
+    pub fn with_polyhedra(mut self, polyhedra: Polyhedra) -> Result<Self> {
+        self.set_polyhedra(polyhedra)?;
+        Ok(self)
+    }
+
+    /// As [`Self::with_polyhedra`], of this mesh.
+    ///
+    /// # Errors
+    /// Likewise.
+    pub fn set_polyhedra(&mut self, polyhedra: Polyhedra) -> Result<()> {
         let Polyhedra { cells, faces, points } = &polyhedra;
         let fits = |starts: &[u64], end: usize| {
             starts.first() == Some(&0) && starts.is_sorted() && starts.last() == Some(&(end as u64))
@@ -204,7 +213,8 @@ impl Mesh {
             let count = self.points.len();
             return Err(Error::Mesh(format!("the face of a polyhedron names point {p}, but there are {count} points")));
         }
-        Ok(Mesh { polyhedra: Some(polyhedra), ..self })
+        self.polyhedra = Some(polyhedra);
+        Ok(())
     }
 
     /// Adds an array with a value for each point.

@@ -155,6 +155,11 @@ Mesh::Mesh(Mesh&&) noexcept = default;
 Mesh& Mesh::operator=(Mesh&&) noexcept = default;
 Mesh::~Mesh() = default;
 
+void Mesh::addPolyhedra(Numbers cells, Numbers faces, Numbers points)
+{
+  call([&] { bridge::add_polyhedra(*this->Data->Box, numbers(cells), numbers(faces), numbers(points)); });
+}
+
 void Mesh::addArray(const std::string& name, Association association, std::size_t components, Numbers n)
 {
   call([&] {

@@ -163,6 +163,10 @@ public:
   Mesh& operator=(Mesh&&) noexcept;
   ~Mesh();
 
+  /// Says what faces the polyhedra (VTK's type 42) among the cells have; without it they are not drawn. Cell i has the faces
+  /// cells[i] to cells[i + 1] (none if it is no polyhedron), face j the points points[faces[j]] to points[faces[j + 1]].
+  void addPolyhedra(Numbers cells, Numbers faces, Numbers points);
+
   /// Adds a copy of an array, in tuples of `components`. One called "vtkGhostType" says which cells and points are
   /// left out, as in VTK.
   void addArray(const std::string& name, Association, std::size_t components, Numbers);

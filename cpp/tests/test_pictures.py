@@ -41,6 +41,27 @@ def test_pyramids_fill_a_cube():
     check(pixels(w), truth(r, (64, 64), field=SLANT, opacity=WAVES, color=RAMP))
 
 
+def test_polyhedra_and_curved_cells():
+    corners = np.array([(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)], float)
+    faces = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    stream = [len(faces)] + [n for f in faces for n in (4, *f)]
+    g = grid(corners, [], SLANT(corners))
+    ids = vtkCommonCore.vtkIdList()
+    for n in stream:
+        ids.InsertNextId(n)
+    g.InsertNextCell(vtkCommonDataModel.VTK_POLYHEDRON, ids)
+    w, r = scene(volume(g, WAVES, RAMP))
+    check(pixels(w), truth(r, (64, 64), field=SLANT, opacity=WAVES, color=RAMP), what="polyhedron")
+
+    sequence = (0, 1, 3, 2, 4, 5, 7, 6)
+    edges = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
+    nodes = corners[list(sequence)]
+    nodes = np.concatenate([nodes, [(nodes[a] + nodes[b]) / 2 for a, b in edges]])
+    g = grid(nodes, [(vtkCommonDataModel.VTK_QUADRATIC_HEXAHEDRON, range(20))], SLANT(nodes))
+    w, r = scene(volume(g, WAVES, RAMP))
+    check(pixels(w), truth(r, (64, 64), field=SLANT, opacity=WAVES, color=RAMP), what="quadratic hexahedron")
+
+
 def test_small_cell_beside_one_thirty_times_larger():
     # Projected tetrahedra lose the small one in perspective views.
     def with_giant(giant):

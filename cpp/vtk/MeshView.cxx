@@ -5,10 +5,12 @@
 
 #include "vtkCellArray.h"
 #include "vtkCellData.h"
+#include "vtkCellType.h"
 #include "vtkDataArray.h"
 #include "vtkDataSetAttributes.h"
 #include "vtkDoubleArray.h"
 #include "vtkIdList.h"
+#include "vtkNew.h"
 #include "vtkPointData.h"
 #include "vtkPoints.h"
 #include "vtkSOADataArrayTemplate.h"
@@ -16,6 +18,8 @@
 #include "vtkUnsignedCharArray.h"
 #include "vtkUnstructuredGrid.h"
 #include "vtkUnstructuredGridBase.h"
+
+#include <cstring>
 
 namespace
 {
@@ -153,6 +157,40 @@ halite::Numbers MeshView::Points(vtkUnstructuredGridBase* grid)
   return this->Numbers(points);
 }
 
+namespace
+{
+
+// The faces of the grid's polyhedra, as halite::Mesh::addPolyhedra() takes them.
+struct Faces
+{
+  std::vector<std::int64_t> Cells{ 0 }, Starts{ 0 }, Points;
+
+  explicit Faces(vtkUnstructuredGrid* grid)
+  {
+    vtkNew<vtkIdList> stream;
+    for (vtkIdType cell = 0; cell < grid->GetNumberOfCells(); ++cell)
+    {
+      if (grid->GetCellType(cell) == VTK_POLYHEDRON)
+      {
+        // The number of faces; then of each, the number of points, and those.
+        grid->GetFaceStream(cell, stream);
+        for (vtkIdType at = 1; at < stream->GetNumberOfIds();)
+        {
+          const vtkIdType end = at + 1 + stream->GetId(at);
+          while (++at < end)
+          {
+            this->Points.push_back(stream->GetId(at));
+          }
+          this->Starts.push_back(static_cast<std::int64_t>(this->Points.size()));
+        }
+      }
+      this->Cells.push_back(static_cast<std::int64_t>(this->Starts.size()) - 1);
+    }
+  }
+};
+
+}
+
 halite::Mesh MeshView::Mesh(vtkUnstructuredGridBase* base)
 {
   static const std::vector<std::int64_t> zero{ 0 };
@@ -191,6 +229,13 @@ halite::Mesh MeshView::Mesh(vtkUnstructuredGridBase* base)
     connectivity = this->Numbers(c);
   }
   halite::Mesh mesh(this->Points(base), types, offsets, connectivity);
+  auto grid = vtkUnstructuredGrid::SafeDownCast(base);
+  if (grid && types.type == halite::Type::UInt8 && types.count > 0 && std::memchr(types.data, VTK_POLYHEDRON, types.count))
+  {
+    const Faces faces(grid);
+    this->Copies += 3;
+    mesh.addPolyhedra(faces.Cells, faces.Starts, faces.Points);
+  }
   const std::string name = vtkDataSetAttributes::GhostArrayName();
   if (vtkDataArray* ghosts = Ghosts(base->GetPointData()))
   {
