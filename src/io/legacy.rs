@@ -18,6 +18,7 @@ pub(super) fn read(path: &Path, file: &mut File) -> Result<Mesh> {
     let mut bytes = Vec::new();
     file.rewind().and_then(|()| file.read_to_end(&mut bytes)).map_err(|e| Error::file(path, e))?;
     skip_field_data(&mut bytes);
+    let bytes = rename_types(&bytes);
     let help = "; a .vtu file of the same grid will do";
     let parsed = catch_unwind(|| match vtkio::parser::parse_be(&bytes) {
         Ok((rest, vtk)) => Some((rest.len(), vtk.data)),
@@ -105,6 +106,31 @@ fn unfold(cells: Cells) -> Result<(Cells, Option<Polyhedra>), usize> {
         polyhedra.cells.push(polyhedra.faces.len() as u64 - 1);
     }
     Ok((Cells { types: cells.types, offsets, connectivity }, Some(polyhedra)))
+}
+
+/// Gives number types the names by which vtkio knows them, in the lines that announce arrays.
+fn rename_types(bytes: &[u8]) -> Vec<u8> {
+    let names: [(&[u8], &[u8]); 3] =
+        [(b" vtktypeint64", b" long"), (b" vtktypeuint64", b" unsigned_long"), (b" signed_char", b" char")];
+    let mut out = Vec::with_capacity(bytes.len());
+    for (i, line) in bytes.split(|b| *b == b'\n').enumerate() {
+        if i > 0 {
+            out.push(b'\n');
+        }
+        let announces = line.len() < 1000 && line.iter().all(|b| b.is_ascii_graphic() || *b == b' ' || *b == b'\r');
+        let words = line.split(|b| *b == b' ').take(4).count();
+        // The cells' own lines have two words, and vtkio knows their types.
+        let renamed = |(from, to): &(&'static [u8], &'static [u8])| {
+            let at = line.windows(from.len()).position(|w| w == *from)?;
+            Some([&line[..at], *to, &line[at + from.len()..]])
+        };
+        let found = if announces && words >= 3 { names.iter().find_map(renamed) } else { None };
+        match found {
+            Some(parts) => parts.iter().for_each(|part| out.extend_from_slice(part)),
+            None => out.extend_from_slice(line),
+        }
+    }
+    out
 }
 
 /// Takes out the field data between DATASET and POINTS, such as the time of a step, which vtkio does not expect there. Leaves
