@@ -56,16 +56,19 @@ fn kind(values: &Values) -> &'static str {
     }
 }
 
+/// VTK's reader of ascii numbers loses the sign of −inf.
 fn same(a: &[f64], b: &[f64]) -> bool {
-    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a == b || (a.is_nan() && b.is_nan()))
+    a.len() == b.len()
+        && a.iter().zip(b).all(|(a, b)| a == b || (a.is_nan() && b.is_nan()) || (a.is_infinite() && b.is_infinite()))
 }
 
 fn floats(values: &Values) -> Vec<f64> {
     (0..values.len()).map(|i| values.get(i)).collect()
 }
 
-/// What differs between a mesh and a file's part of the dump.
-fn differences(mesh: &Mesh, dump: &[(Vec<String>, Vec<u8>)]) -> Vec<String> {
+/// What differs between a mesh and a file's part of the dump. Unless `exact`, there may be more arrays: VTK keeps one of those with
+/// one name, and of lists of pieces only what the list names.
+fn differences(mesh: &Mesh, dump: &[(Vec<String>, Vec<u8>)], exact: bool) -> Vec<String> {
     let mut wrong = vec![];
     let mut check = |what: &str, ok: bool| {
         if !ok {
@@ -119,9 +122,11 @@ fn differences(mesh: &Mesh, dump: &[(Vec<String>, Vec<u8>)]) -> Vec<String> {
             _ => {}
         }
     }
-    for (arrays, named) in [(mesh.cell_arrays(), &named[0]), (mesh.point_arrays(), &named[1])] {
-        for array in arrays {
-            check(&format!("array \"{}\", which VTK does not have", array.name), named.contains(&array.name));
+    if exact {
+        for (arrays, named) in [(mesh.cell_arrays(), &named[0]), (mesh.point_arrays(), &named[1])] {
+            for array in arrays {
+                check(&format!("array \"{}\", which VTK does not have", array.name), named.contains(&array.name));
+            }
         }
     }
     wrong
@@ -197,7 +202,8 @@ fn vtk_reads_the_same() {
             Err(error) if path.starts_with(&written) => wrong.push(error.to_string()),
             Err(error) => eprintln!("refused: {error}"),
             Ok(mesh) => {
-                let differs = differences(&mesh, &dump);
+                let exact = path.starts_with(&written) && path.extension().is_some_and(|e| e != "pvtu");
+                let differs = differences(&mesh, &dump, exact);
                 equal += usize::from(differs.is_empty());
                 if !differs.is_empty() {
                     wrong.push(format!("{}: {}", path.display(), differs.join(", ")));

@@ -1,5 +1,6 @@
 //! Legacy .vtk files, read by vtkio.
 
+use super::vtu::renumber;
 use super::{refuse, validated};
 use crate::error::{Error, Result};
 use crate::mesh::{Array, Cells, Mesh, POLYHEDRON, Polyhedra, Values};
@@ -17,7 +18,11 @@ use vtkio::model::{Attribute, CellType, DataSet, IOBuffer, Piece, UnstructuredGr
 pub(super) fn read(path: &Path, file: &mut File) -> Result<Mesh> {
     let mut bytes = Vec::new();
     file.rewind().and_then(|()| file.read_to_end(&mut bytes)).map_err(|e| Error::file(path, e))?;
+    // "# vtk DataFile Version 4.2": from 5.1 on Lagrange hexahedra are numbered as now.
+    let version = bytes.get(23..26).and_then(|v| std::str::from_utf8(v).ok()?.trim().parse().ok());
+    let old_numbering = version.is_some_and(|version: f64| version < 5.1);
     skip_field_data(&mut bytes);
+    let bytes = rename_types(&bytes);
     let help = "; a .vtu file of the same grid will do";
     let parsed = catch_unwind(|| match vtkio::parser::parse_be(&bytes) {
         Ok((rest, vtk)) => Some((rest.len(), vtk.data)),
@@ -40,10 +45,10 @@ pub(super) fn read(path: &Path, file: &mut File) -> Result<Mesh> {
         return Err(Error::unsupported(path, format!("vtkio stops at byte {at}, at \"{next}\"{help}")));
     }
     let Some(Piece::Inline(piece)) = piece else { return Err(Error::malformed(path, "there is no grid in it")) };
-    mesh(path, *piece)
+    mesh(path, *piece, old_numbering)
 }
 
-fn mesh(path: &Path, piece: UnstructuredGridPiece) -> Result<Mesh> {
+fn mesh(path: &Path, piece: UnstructuredGridPiece, old_numbering: bool) -> Result<Mesh> {
     let fail = |what: &str| Error::malformed(path, what);
     let coordinates = values(piece.points).ok_or_else(|| fail("the points are not numbers"))?;
     let points =
@@ -69,7 +74,11 @@ fn mesh(path: &Path, piece: UnstructuredGridPiece) -> Result<Mesh> {
             (offsets, connectivity.into_iter().map(narrow).collect())
         }
     };
-    let cells = Cells { types, offsets, connectivity };
+    let mut cells = Cells { types, offsets, connectivity };
+    let fits = cells.offsets.is_sorted() && cells.offsets.last() == Some(&(cells.connectivity.len() as u64));
+    if old_numbering && fits && cells.offsets.len() == cells.types.len() + 1 {
+        renumber(&cells.types, &cells.offsets[1..], &mut cells.connectivity);
+    }
     let (cells, polyhedra) = unfold(cells)
         .map_err(|c| fail(&format!("the faces of polyhedron {c} do not fit the numbers that CELLS lists for it")))?;
     let mesh = Mesh::new(points, cells, arrays(piece.data.point), arrays(piece.data.cell));
@@ -105,6 +114,31 @@ fn unfold(cells: Cells) -> Result<(Cells, Option<Polyhedra>), usize> {
         polyhedra.cells.push(polyhedra.faces.len() as u64 - 1);
     }
     Ok((Cells { types: cells.types, offsets, connectivity }, Some(polyhedra)))
+}
+
+/// Gives number types the names by which vtkio knows them, in the lines that announce arrays.
+fn rename_types(bytes: &[u8]) -> Vec<u8> {
+    let names: [(&[u8], &[u8]); 3] =
+        [(b" vtktypeint64", b" long"), (b" vtktypeuint64", b" unsigned_long"), (b" signed_char", b" char")];
+    let mut out = Vec::with_capacity(bytes.len());
+    for (i, line) in bytes.split(|b| *b == b'\n').enumerate() {
+        if i > 0 {
+            out.push(b'\n');
+        }
+        let announces = line.len() < 1000 && line.iter().all(|b| b.is_ascii_graphic() || *b == b' ' || *b == b'\r');
+        let words = line.split(|b| *b == b' ').take(4).count();
+        // The cells' own lines have two words, and vtkio knows their types.
+        let renamed = |(from, to): &(&'static [u8], &'static [u8])| {
+            let at = line.windows(from.len()).position(|w| w == *from)?;
+            Some([&line[..at], *to, &line[at + from.len()..]])
+        };
+        let found = if announces && words >= 3 { names.iter().find_map(renamed) } else { None };
+        match found {
+            Some(parts) => parts.iter().for_each(|part| out.extend_from_slice(part)),
+            None => out.extend_from_slice(line),
+        }
+    }
+    out
 }
 
 /// Takes out the field data between DATASET and POINTS, such as the time of a step, which vtkio does not expect there. Leaves

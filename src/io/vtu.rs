@@ -671,8 +671,8 @@ fn told(point: Option<u64>) -> String {
     point.map_or("a negative point".to_owned(), |point| format!("point {point}"))
 }
 
-/// Lagrange hexahedra in files before version 2.1 have the third and fourth of their upright edges the other way round.
-fn renumber(types: &[u8], ends: &[u64], connectivity: &mut [u32]) {
+/// Lagrange hexahedra in files of before VTK 9 have the third and fourth of their upright edges the other way round.
+pub(super) fn renumber(types: &[u8], ends: &[u64], connectivity: &mut [u32]) {
     let mut start = 0;
     for (vtk_type, end) in types.iter().zip(ends) {
         let points = &mut connectivity[start..*end as usize];

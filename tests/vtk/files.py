@@ -145,6 +145,9 @@ def write(folder):
                     (writer.SetByteOrderToBigEndian if big else writer.SetByteOrderToLittleEndian)()
                     (writer.SetHeaderTypeToUInt64 if big else writer.SetHeaderTypeToUInt32)()
                     writer.Write()
+        # The vtkio crate, which reads these files, does not know unsigned shorts, and says so.
+        grid.GetPointData().RemoveArray("UnsignedShort")
+        grid.GetCellData().RemoveArray("UnsignedShort")
         for version in (42, 51):
             for binary in (0, 1):
                 writer = vtk.vtkUnstructuredGridWriter()
