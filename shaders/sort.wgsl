@@ -33,6 +33,7 @@ var<workgroup> tally: array<atomic<u32>, 16>;
 var<workgroup> before: array<vec4u, 256>;
 var<workgroup> places: array<u32, 16>;
 var<workgroup> sums: array<u32, 256>;
+var<workgroup> last: array<atomic<u32>, 16>;
 
 fn present() -> u32 {
     return select(min(digits.items, total[0]), digits.items, digits.is_first == 1u);
@@ -104,6 +105,7 @@ fn scatter(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
     }
     if thread < 16u {
         places[thread] = counts[thread * digits.blocks + block];
+        atomicStore(&last[thread], 0u);
     }
     for (var round = 0u; round < ROUNDS; round++) {
         let i = block * BLOCK + round * ITEMS + thread;
@@ -160,5 +162,3 @@ fn scatter(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
         workgroupBarrier();
     }
 }
-
-var<workgroup> last: array<atomic<u32>, 16>;
