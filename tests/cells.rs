@@ -147,7 +147,7 @@ const SIMPLEX_NODES: [&[usize]; 11] = [
 const PRISM_SURFACE: f64 = 3.0 + std::f64::consts::SQRT_2;
 const TENT_SURFACE: f64 = 2.0 + std::f64::consts::SQRT_2;
 /// 3/2 + √3/2.
-const SIMPLEX_SURFACE: f64 = 2.366_025_403_784_438_6;
+const SIMPLEX_SURFACE: f64 = 2.366_025_403_784_438_4;
 
 const KINDS: [Kind; 14] = [
     Kind {

@@ -63,7 +63,7 @@ struct Style {
 enum Codec {
     ZLib,
     LZ4,
-    LZMA,
+    Lzma,
 }
 
 const PLAIN: Style =
@@ -97,7 +97,7 @@ impl Codec {
                 encoder.finish().unwrap()
             }
             Codec::LZ4 => lz4_flex::block::compress(bytes),
-            Codec::LZMA => {
+            Codec::Lzma => {
                 let mut encoder = lzma_rust2::XzWriter::new(Vec::new(), lzma_rust2::XzOptions::with_preset(1)).unwrap();
                 encoder.write_all(bytes).unwrap();
                 encoder.finish().unwrap()
@@ -252,7 +252,7 @@ fn styles() -> Vec<Style> {
                 for block in [Some(72), Some(100), Some(50), Some(1 << 15)] {
                     styles.push(Style { block, together: false, ..style });
                 }
-                for codec in [Codec::LZ4, Codec::LZMA] {
+                for codec in [Codec::LZ4, Codec::Lzma] {
                     styles.push(Style { block: Some([50, 72][usize::from(wide)]), codec, together: false, ..style });
                 }
                 for together in [true, false] {
@@ -672,7 +672,7 @@ fn damage_is_named() {
     let wide_types = Piece { types: Values::I16(vec![10, 256]), ..piece() };
     assert!(malformed(&write(PLAIN, &[wide_types])).contains("the type of cell 1 is not in 0..=255"));
     assert!(matches!(halite::io::open(Path::new("no/such.vtu"), &|_| ()), Err(Error::File { .. })));
-    for codec in [Codec::ZLib, Codec::LZ4, Codec::LZMA] {
+    for codec in [Codec::ZLib, Codec::LZ4, Codec::Lzma] {
         let style = Style { mode: Mode::AppendedRaw, block: Some(64), codec, ..PLAIN };
         let mut bytes = write(style, &[piece()]);
         let start = bytes.windows(2).position(|w| w == b" _").unwrap() + 2 + 16;

@@ -9,6 +9,7 @@
     reason = "a test fails by panicking"
 )]
 
+use glam::DVec3;
 use halite::mesh::{Array, Mesh, POLYHEDRON, Values};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -72,7 +73,7 @@ fn differences(mesh: &Mesh, dump: &[(Vec<String>, Vec<u8>)], exact: bool) -> Vec
     let mut wrong = vec![];
     let mut check = |what: &str, ok: bool| {
         if !ok {
-            wrong.push(what.to_owned())
+            wrong.push(what.to_owned());
         }
     };
     let cells = mesh.cells();
@@ -81,12 +82,12 @@ fn differences(mesh: &Mesh, dump: &[(Vec<String>, Vec<u8>)], exact: bool) -> Vec
     for (i, (words, bytes)) in dump.iter().enumerate() {
         match words[0].as_str() {
             "points" => {
-                let ours: Vec<f64> = mesh.points().iter().flat_map(|p| p.to_array()).collect();
+                let ours: Vec<f64> = mesh.points().iter().flat_map(DVec3::to_array).collect();
                 check("points", same(&ours, &numbers(&words[1], bytes)));
             }
             "types" => check("types", cells.types == *bytes),
             "ends" => {
-                check("offsets", same(&cells.offsets[1..].iter().map(|o| *o as f64).collect::<Vec<_>>(), &ids(bytes)))
+                check("offsets", same(&cells.offsets[1..].iter().map(|o| *o as f64).collect::<Vec<_>>(), &ids(bytes)));
             }
             "connectivity" => {
                 check(
@@ -132,9 +133,12 @@ fn differences(mesh: &Mesh, dump: &[(Vec<String>, Vec<u8>)], exact: bool) -> Vec
     wrong
 }
 
+/// What VTK says of a file: lines of words, each with its bytes.
+type Dump = Vec<(Vec<String>, Vec<u8>)>;
+
 /// The dump of each file.
-fn dumps(bytes: &[u8]) -> Vec<(PathBuf, Vec<(Vec<String>, Vec<u8>)>)> {
-    let mut all: Vec<(PathBuf, Vec<(Vec<String>, Vec<u8>)>)> = vec![];
+fn dumps(bytes: &[u8]) -> Vec<(PathBuf, Dump)> {
+    let mut all: Vec<(PathBuf, Dump)> = vec![];
     let mut at = 0;
     while at < bytes.len() {
         let end = at + bytes[at..].iter().position(|b| *b == b'\n').unwrap();

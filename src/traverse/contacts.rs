@@ -63,7 +63,7 @@ fn contact(geometry: &Geometry, face: usize) -> Contact {
     let near = NEAR * a.distance(b).max(b.distance(c)).max(c.distance(a));
     // Where the face hardly rises over the line, a near plane is met far away.
     let steep = normal.dot(direction) / normal.length();
-    if !(steep > 1e-9) {
+    if steep.is_nan() || steep <= 1e-9 {
         return Contact::None;
     }
     let near = near / steep;
