@@ -240,6 +240,9 @@ impl Interval {
     }
 }
 
+/// Heights of a tetrahedron, relative to the mesh, that are nothing but rounding.
+const FLAT: f64 = 2e-15;
+
 impl Tetrahedron {
     /// Where the ray is inside. Outer none: it lies in a face; inner none: it misses.
     fn interval(&self, origin: DVec3, direction: DVec3, extent: f64) -> Option<Option<Interval>> {
@@ -252,7 +255,8 @@ impl Tetrahedron {
             face.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z)));
             let normal = (face[1] - face[0]).cross(face[2] - face[0]).normalize_or_zero();
             let side = normal.dot(self.corners[k] - face[0]);
-            if side == 0.0 {
+            // What is as flat as coordinates are rounded has no inside that could be told.
+            if side.abs() <= FLAT * extent {
                 return Some(None);
             }
             let (height, slope) = (normal.dot(face[0] - origin), normal.dot(direction));

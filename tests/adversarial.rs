@@ -6,7 +6,7 @@ mod common;
 
 use common::draw::{self, MESHES, Random};
 use common::{ENGINES, Engine, Scene, rounds};
-use glam::{DMat3, DQuat, DVec3, dvec3};
+use glam::{DMat3, DQuat, DVec3, dvec2, dvec3};
 use halite::field::Association;
 use halite::mesh::cells::Tetrahedra;
 use halite::mesh::faces::Faces;
@@ -14,13 +14,16 @@ use halite::mesh::{Array, Mesh, Values, generate};
 use halite::transfer::TransferFunction;
 use halite::view::{Camera, Projection, View};
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 
 /// What the engines must reach.
 const BOUND: f64 = 5e-4;
 const SIZE: [u32; 2] = [11, 9];
 
 fn config(cases: usize) -> ProptestConfig {
-    ProptestConfig { cases: rounds(cases) as u32, failure_persistence: None, ..ProptestConfig::default() }
+    // The same cases in every run: a test that fails now and then tells nobody what broke it.
+    let rng_seed = RngSeed::Fixed(2004);
+    ProptestConfig { cases: rounds(cases) as u32, failure_persistence: None, rng_seed, ..ProptestConfig::default() }
 }
 
 /// A mesh of `cells`, and an array of as many values as it has points, which are made of `value`.
@@ -140,7 +143,7 @@ proptest! {
         odd in prop::collection::vec((any::<u8>(), prop::sample::select(vec![f64::NAN, f64::INFINITY, 1e30, -1e30, 0.0])), 0..3),
         from in [-1.0..1.0f64, -1.0..1.0f64, 0.1..1.0f64],
     ) {
-        // A little off the lattice, so that no ray lies in a face.
+        // A little off the lattice, and off the middle of the pixels, so that no ray lies in a face: then either side is right.
         let place = |p: &[i8; 3]| DVec3::from(p.map(f64::from)) * dvec3(1.0, 0.97, 1.03) + dvec3(0.013, 0.007, -0.011);
         let all: Vec<DVec3> = points.iter().map(place).collect();
         let size = |t: u8| match t { 10 => 4, 12 => 8, 13 => 6, 14 => 5, _ => 10 };
@@ -152,7 +155,7 @@ proptest! {
             odd.unwrap_or(i as f64)
         };
         let from = DVec3::from(from).normalize();
-        let view = view(&mesh, from, 30.0);
+        let view = view(&mesh, from, 30.0).with_pixel_offset(dvec2(0.1372, 0.2113));
         if let Some(scene) = scene(&mesh, value) {
             let truth = Engine::Reference.image(&scene, &view);
             for engine in ENGINES {

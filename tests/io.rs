@@ -169,7 +169,12 @@ fn write(style: Style, pieces: &[Piece]) -> Vec<u8> {
     write!(head, " byte_order=\"{}Endian\"", if style.big_endian { "Big" } else { "Little" }).unwrap();
     write!(head, " header_type=\"UInt{}\"", if style.wide { 64 } else { 32 }).unwrap();
     if style.block.is_some() {
-        write!(head, " compressor=\"vtk{:?}DataCompressor\"", style.codec).unwrap();
+        let name = match style.codec {
+            Codec::ZLib => "ZLib",
+            Codec::LZ4 => "LZ4",
+            Codec::Lzma => "LZMA",
+        };
+        write!(head, " compressor=\"vtk{name}DataCompressor\"").unwrap();
     }
     head += ">\n<UnstructuredGrid>\n";
     for piece in pieces {

@@ -10,21 +10,21 @@ use wgpu::BufferUsages as Usage;
 /// `Function` in the shader.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
-struct Function {
-    opacity: u32,
-    color: u32,
-    end: u32,
-    scale: f32,
+pub(crate) struct Function {
+    pub(crate) opacity: u32,
+    pub(crate) color: u32,
+    pub(crate) end: u32,
+    pub(crate) scale: f32,
 }
 
 /// `Knot` in the shader.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
-struct Knot {
-    value: [f32; 4],
-    slope: [f32; 4],
-    s: f32,
-    padding: [f32; 3],
+pub(crate) struct Knot {
+    pub(crate) value: [f32; 4],
+    pub(crate) slope: [f32; 4],
+    pub(crate) s: f32,
+    pub(crate) padding: [f32; 3],
 }
 
 /// `Function`, its knots and its buckets: bindings 0 to 2 of group 0.

@@ -77,7 +77,8 @@ fn mesh(path: &Path, piece: UnstructuredGridPiece, old_numbering: bool) -> Resul
     let mut cells = Cells { types, offsets, connectivity };
     let fits = cells.offsets.is_sorted() && cells.offsets.last() == Some(&(cells.connectivity.len() as u64));
     if old_numbering && fits && cells.offsets.len() == cells.types.len() + 1 {
-        renumber(&cells.types, &cells.offsets[1..], &mut cells.connectivity);
+        // VTK's reader takes Bézier hexahedra for such too.
+        renumber(&[72, 79], &cells.types, &cells.offsets[1..], &mut cells.connectivity);
     }
     let (cells, polyhedra) = unfold(cells)
         .map_err(|c| fail(&format!("the faces of polyhedron {c} do not fit the numbers that CELLS lists for it")))?;

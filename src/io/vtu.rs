@@ -472,7 +472,7 @@ impl Grid<'_> {
             format!("cell {cell} names {}, but there are {} points", told(point), piece.points)
         })?;
         if piece.old_numbering && offsets.is_sorted() && length == connectivity.len() as u64 {
-            renumber(&types, &offsets, &mut connectivity);
+            renumber(&[72], &types, &offsets, &mut connectivity);
         }
         let polyhedra = if types.contains(&POLYHEDRON) { self.polyhedra_of(piece, &types, base)? } else { None };
         Ok(Topology { cells: Cells { types, offsets, connectivity }, polyhedra })
@@ -671,14 +671,14 @@ fn told(point: Option<u64>) -> String {
     point.map_or("a negative point".to_owned(), |point| format!("point {point}"))
 }
 
-/// Lagrange hexahedra in files of before VTK 9 have the third and fourth of their upright edges the other way round.
-pub(super) fn renumber(types: &[u8], ends: &[u64], connectivity: &mut [u32]) {
+/// Hexahedra of these VTK types had, before VTK 9, the third and fourth of their upright edges the other way round.
+pub(super) fn renumber(of: &[u8], types: &[u8], ends: &[u64], connectivity: &mut [u32]) {
     let mut start = 0;
     for (vtk_type, end) in types.iter().zip(ends) {
         let points = &mut connectivity[start..*end as usize];
         start = *end as usize;
         let degree = (2..=10).find(|p: &usize| (p + 1).pow(3) == points.len());
-        if let (72, Some(degree)) = (vtk_type, degree) {
+        if let (true, Some(degree)) = (of.contains(vtk_type), degree) {
             let (edge, upright) = (degree - 1, 8 + 8 * (degree - 1));
             let (third, fourth) = points[upright + 2 * edge..upright + 4 * edge].split_at_mut(edge);
             third.swap_with_slice(fourth);

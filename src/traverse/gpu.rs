@@ -6,8 +6,9 @@ use super::{Cell, Geometry, Values};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::buffers::{Buffer, Chunks};
+use crate::gpu::function;
 use crate::gpu::shader::{self, Array, Binding, Variant};
-use crate::integral::{Exact, Knots};
+use crate::integral::Exact;
 use crate::mesh::faces::BOUNDARY;
 use crate::view::{Blend, Fan, View};
 use bytemuck::{Pod, Zeroable};
@@ -68,26 +69,6 @@ struct Frame {
     faces: u32,
     most_steps: u32,
     most_work: u32,
-}
-
-/// `Function` in the shader.
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-#[repr(C)]
-struct Function {
-    opacity: u32,
-    color: u32,
-    end: u32,
-    scale: f32,
-}
-
-/// `Knot` in the shader.
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-#[repr(C)]
-struct Knot {
-    value: [f32; 4],
-    slope: [f32; 4],
-    s: f32,
-    padding: [f32; 3],
 }
 
 /// `Outer` in the shader.
@@ -206,7 +187,7 @@ impl Traverse {
             self.values = Some(Chunks::new(gpu, "values", all, finite)?);
         }
         if self.function.is_none() {
-            self.function = Some(upload_function(gpu, exact)?);
+            self.function = Some(function::upload(gpu, exact)?);
         }
         Ok(())
     }
@@ -428,24 +409,6 @@ fn program(variant: &Variant, association: &str, blend: Blend, arrays: &[Array])
     text += "struct Point { x: f32, y: f32, z: f32, x_low: f32, y_low: f32, z_low: f32 }\n";
     text += &shader::accessors(arrays);
     [&text, shader::CELL, shader::INTEGRAL, TRAVERSE].join("\n")
-}
-
-/// `Function`, its knots and its buckets.
-fn upload_function(gpu: &Gpu, exact: &Exact<f32>) -> Result<[Buffer; 3]> {
-    let functions: Vec<&Knots<f32>> = [Some(&exact.opacity), exact.color.as_ref()].into_iter().flatten().collect();
-    let (mut knots, mut buckets) = (Vec::<Knot>::new(), Vec::<u32>::new());
-    for f in functions {
-        buckets.extend(f.bucket.iter().map(|b| b + knots.len() as u32));
-        let knot = |i: usize| Knot { value: f.value[i], slope: f.slope[i], s: f.s[i], padding: [0.0; 3] };
-        knots.extend((0..f.len()).map(knot));
-    }
-    let end = knots.len() as u32;
-    let function = Function { opacity: 0, color: exact.opacity.len() as u32, end, scale: exact.scale };
-    Ok([
-        Buffer::holding(gpu, "function", &[function], Usage::UNIFORM)?,
-        Buffer::holding(gpu, "knots", &knots, Usage::STORAGE)?,
-        Buffer::holding(gpu, "buckets", &buckets, Usage::STORAGE)?,
-    ])
 }
 
 /// Where a depth buffer ends each pixel's ray, as the shader counts t; empty without one.

@@ -291,7 +291,7 @@ fn tetrahedron_points(p: usize) -> Vec<[usize; 4]> {
         for [a, b] in [[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]] {
             all.extend(between(corners[a], corners[b], left).map(inner));
         }
-        for face in [[0, 1, 3], [1, 2, 3], [0, 3, 2], [0, 2, 1]] {
+        for face in [[0, 1, 3], [2, 3, 1], [0, 3, 2], [0, 2, 1]] {
             all.extend(triangle_inside(face.map(|n| corners[n]), left).into_iter().map(inner));
         }
         if left < 4 {

@@ -4,6 +4,7 @@ use super::*;
 use crate::cell::{Face, Projected};
 use crate::field::{Association, Component, Field, Kind, Normal};
 use crate::gpu::DeviceChoice;
+use crate::gpu::function::{Function, Knot};
 use crate::image::Image;
 use crate::integral::Light;
 use crate::mesh::cells::Tetrahedra;
@@ -280,7 +281,7 @@ fn segments_are_integrated_as_in_f64() {
         let variant = Variant { kind, direct: fast.direct };
         let convert = format!("fn value_of(v: vec4f) -> Value {{ return {value}; }}");
         let source = [&shader::prelude(&variant), &convert, shader::INTEGRAL, INTEGRAL_TEST].join("\n");
-        let [function, knots, buckets] = upload_function(&gpu, &fast).unwrap();
+        let [function, knots, buckets] = function::upload(&gpu, &fast).unwrap();
         let group = [(Binding::Uniform, &function), (Binding::Read, &knots), (Binding::Read, &buckets)];
         let outcomes: Vec<[f32; 4]> = run(&gpu, &source, &group, &cases);
         for ([front, back, length], got) in cases.iter().zip(&outcomes) {
