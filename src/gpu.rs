@@ -1,6 +1,6 @@
 //! Devices: which there are, how one is opened, what it may be asked for, and what became of it.
 //!
-//! Nothing here panics or aborts when a device fails: its first fault is kept, and [`Gpu::check`] tells it.
+//! Nothing here panics or aborts when a device fails: its first fault is kept, and `Gpu::check` tells it.
 
 pub(crate) mod buffers;
 pub(crate) mod function;

@@ -6,8 +6,8 @@
 //! its smallest point, whichever cell looks at it. The order is that of exact positions (x, then y, then z), so cells
 //! that do not share point indices agree too; indices only break ties.
 
-//! Cells of higher order are split through all their nodes ([`curved`]), polyhedra around a point in their middle
-//! ([`polyhedron`]); both may add points to those of the mesh.
+//! Cells of higher order are split through all their nodes (`curved`), polyhedra around a point in their middle
+//! (`polyhedron`); both may add points to those of the mesh.
 
 mod curved;
 mod polyhedron;
