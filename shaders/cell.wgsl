@@ -40,17 +40,16 @@ struct Step {
 
 const NOWHERE = 3u;
 
-/// The sum of two vectors, with what its rounding left (Knuth 1969, 4.2.2 B). Compilers may take (a + b) - a for b, and Mesa's does:
-/// what is left would be nothing. They do not see through the loss of the last digit.
+/// The sum of two vectors, with what its rounding left (Knuth 1969, 4.2.2 B).
 fn sum(a: vec3f, b: vec3f) -> Twice {
-    let s = even(a + b);
-    let v = even(s - a);
+    let s = computed(a + b);
+    let v = computed(s - a);
     return Twice(s, (a - (s - v)) + (b - v));
 }
 
-/// `v` with 0 as its last digit.
-fn even(v: vec3f) -> vec3f {
-    return bitcast<vec3f>(bitcast<vec3u>(v) & vec3u(0xfffffffeu));
+/// `v`. Compilers may take (a + b) - a for b, and Mesa's does, but not across this.
+fn computed(v: vec3f) -> vec3f {
+    return max(v, vec3f(-3e38));
 }
 
 /// `v` rounded toward zero to 12 digits, so that products of two such numbers are exact whether or not fma is fused.
