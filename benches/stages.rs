@@ -5,12 +5,12 @@
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec3;
 use halite::field::{Component, Field, Kind, Normal};
+use halite::geometry::Geometry;
 use halite::gpu::{self, DeviceChoice};
 use halite::integral::{Exact, Light};
 use halite::mesh::{Mesh, cells::Tetrahedra, faces::Faces, generate};
 use halite::render::Renderer;
 use halite::transfer::{Convention, TransferFunction};
-use halite::traverse::Geometry;
 use halite::view::{Camera, Projection, View};
 use std::hint::black_box;
 use std::io::Write;

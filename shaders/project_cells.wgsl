@@ -10,12 +10,6 @@ struct Part {
     rank: u32,
 }
 
-/// High and low parts of the normalised coordinates.
-struct Point {
-    x: f32, y: f32, z: f32,
-    u: f32, v: f32, w: f32,
-}
-
 @group(2) @binding(0) var<uniform> part: Part;
 /// The number of parts of the values' range, of FILLED equal ones, below each in which the function is not empty.
 @group(2) @binding(1) var<storage, read> filled: array<u32>;
@@ -26,7 +20,7 @@ struct Point {
 
 fn place(i: u32) -> vec3f {
     let p = points(i);
-    return (vec3f(p.x, p.y, p.z) - frame.base.xyz) + (vec3f(p.u, p.v, p.w) - frame.base_low.xyz);
+    return (vec3f(p.x, p.y, p.z) - frame.base.xyz) + (vec3f(p.x_low, p.y_low, p.z_low) - frame.base_low.xyz);
 }
 
 fn places(cell: vec4u) -> array<vec3f, 4> {

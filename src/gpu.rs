@@ -2,15 +2,32 @@
 //!
 //! Nothing here panics or aborts when a device fails: its first fault is kept, and `Gpu::check` tells it.
 
+pub(crate) mod arrays;
 pub(crate) mod buffers;
 pub(crate) mod function;
 pub(crate) mod raster;
 pub(crate) mod shader;
 pub(crate) mod sort;
+#[cfg(test)]
+#[allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr, reason = "tests")]
+pub(crate) mod testing;
 
 use crate::error::{Error, Result};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, Once, PoisonError};
+
+/// What a frame depends on, apart from the view: each part is handed over again only after it was forgotten.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Part {
+    /// Cells and all that follows from them.
+    Mesh,
+    /// Where the points are.
+    Points,
+    /// The field's values.
+    Field,
+    /// The transfer function.
+    Function,
+}
 
 /// Where frames are drawn.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

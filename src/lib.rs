@@ -19,6 +19,7 @@ pub mod error;
 #[cfg(feature = "ffi")]
 pub mod ffi;
 pub mod field;
+pub mod geometry;
 pub mod gpu;
 pub mod host;
 pub mod image;

@@ -2,6 +2,8 @@
 
 use crate::error::{Error, Result};
 use crate::field::{Field, Kind, Normal};
+use crate::geometry::{Geometry, Values};
+use crate::gpu::Part;
 use crate::gpu::{DeviceChoice, Gpu};
 use crate::image::Image;
 use crate::integral::Exact;
@@ -10,8 +12,8 @@ use crate::mesh::cells::Tetrahedra;
 use crate::mesh::faces::Faces;
 use crate::project::{self, Switches, gpu::Project};
 use crate::transfer::TransferFunction;
-use crate::traverse::gpu::{Part, Traverse};
-use crate::traverse::{Geometry, Values, cpu};
+use crate::traverse::cpu;
+use crate::traverse::gpu::Traverse;
 use crate::view::{Blend, View};
 use glam::DVec3;
 use rayon::prelude::*;

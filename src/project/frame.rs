@@ -1,8 +1,8 @@
 //! What a frame's shaders need to know of a view and a transfer function.
 
 use crate::field::Kind;
+use crate::geometry::Geometry;
 use crate::integral::{Exact, Knots};
-use crate::traverse::Geometry;
 use crate::view::{Fan, View};
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat3, DVec3};

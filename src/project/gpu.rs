@@ -7,16 +7,15 @@
 use super::frame::{FAR, FILLED, Frame, Limits, Seen, filled};
 use super::{Coloring, Compositing, Counts, Fragments, Order, Switches, Target, Texels, Thickness};
 use crate::error::{Error, Result};
+use crate::geometry::{Cell, Geometry, Values};
 use crate::gpu::buffers::{Buffer, Chunks};
 use crate::gpu::raster::{self, Readback, Slot, Texture};
 use crate::gpu::shader::{self, Array, Variant};
 use crate::gpu::sort::Sorter;
-use crate::gpu::{DeviceChoice, Gpu, function};
+use crate::gpu::{DeviceChoice, Gpu, Part, arrays, function};
 use crate::integral::Exact;
 use crate::integral::table::{self, Table};
 use crate::order::depth::{self, HIDDEN, IN_PARTS};
-use crate::traverse::gpu::Part;
-use crate::traverse::{Cell, Geometry, Values};
 use crate::view::{Blend, View};
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
@@ -63,9 +62,6 @@ const GROWTH: f64 = 1.0 / 256.0;
 /// How well, in normalised units, places along a ray are known that come from corners in f32.
 const SHARP: f64 = 2e-6;
 
-/// Stands for a value that is not finite; the shaders take all above 1e38 for such.
-const INVISIBLE: f32 = 3e38;
-
 /// Loop iterations of a fragment that llvmpipe surely makes: see `traverse::gpu`.
 const MOST_WORK: u32 = 8000;
 
@@ -81,14 +77,6 @@ struct Slice {
     count: u32,
     row: u32,
     rank: u32,
-}
-
-/// `Point` in the shaders: high and low parts of the coordinates.
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-#[repr(C)]
-struct Point {
-    high: [f32; 3],
-    low: [f32; 3],
 }
 
 /// Somebody who is shown keys, some at a time.
@@ -238,19 +226,10 @@ impl Project {
             self.cells = Some(Chunks::new(gpu, "cells", &geometry.cells, |c| c.corners)?);
         }
         if self.points.is_none() {
-            let point = |p: &glam::DVec3| {
-                let high = p.as_vec3();
-                Point { high: high.to_array(), low: (p - high.as_dvec3()).as_vec3().to_array() }
-            };
-            self.points = Some(Chunks::new(gpu, "points", &geometry.points, point)?);
+            self.points = Some(arrays::points(gpu, geometry)?);
         }
         if self.values.is_none() {
-            let all = match values {
-                Values::Point(v) | Values::Cell(v) => v.as_slice(),
-                Values::Corner(v) => v.as_flattened(),
-            };
-            let finite = |v: &[f32; N]| v.map(|v| if v.is_finite() { v } else { INVISIBLE });
-            self.values = Some(Chunks::new(gpu, "values", all, finite)?);
+            self.values = Some(arrays::values(gpu, values)?);
         }
         if self.function.is_none() {
             let filled = Buffer::holding(gpu, "filled", &filled(exact), Usage::STORAGE)?;
@@ -280,12 +259,8 @@ impl Project {
         let format = self.format(switches.target)?;
         self.upload(geometry, values, exact)?;
         self.prepare_table(geometry, precise, switches)?;
-        let association = match values {
-            Values::Point(_) => "POINT",
-            Values::Corner(_) => "CORNER",
-            Values::Cell(_) => "CELL",
-        };
-        let arrays = self.arrays::<N>()?;
+        let association = arrays::association(values);
+        let arrays = self.arrays()?;
         let seen = Seen::new(geometry, view);
         let variant = Variant { kind: exact.kind, direct: exact.direct };
         let source = program(&variant, association, switches, seen.limits(), &arrays);
@@ -319,7 +294,7 @@ impl Project {
     }
 
     /// The arrays of group 1 of the compute stages, in the order of [`Self::chunks`].
-    fn arrays<const N: usize>(&self) -> Result<[Array; 3]> {
+    fn arrays(&self) -> Result<[Array; 3]> {
         let names = [("cells", "vec4u"), ("points", "Point"), ("values", "Value")];
         let chunks = self.chunks()?;
         Ok(std::array::from_fn(|i| {
@@ -952,6 +927,7 @@ fn program(variant: &Variant, association: &str, switches: &Switches, limits: Li
          const POINT = 0u;\nconst CORNER = 1u;\nconst CELL = 2u;\nconst ASSOCIATION = {association};\n",
         switches.coloring as u32
     );
+    text += arrays::POINT;
     let [records, drawing] = if form == "INTERSECTED" { INTERSECTED } else { INTERPOLATED };
     text += &shader::accessors(arrays);
     [&text, shader::CELL, shader::INTEGRAL, SHARED, CELLS, records, SHADE, drawing].join("\n")

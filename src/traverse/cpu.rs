@@ -2,9 +2,9 @@
 //!
 //! Positions are f64, so that thin layers and great distances cost no accuracy; segments are integrated in f32.
 
-use super::boundary::{Beam, Candidate};
-use super::{Geometry, Values};
 use crate::cell::{Face, Frame};
+use crate::geometry::boundary::{Beam, Candidate};
+use crate::geometry::{Geometry, Values};
 use crate::image::Image;
 use crate::integral::{Batch, Exact, Light};
 use crate::mesh::faces::BOUNDARY;

@@ -1,13 +1,13 @@
 //! The walk on a GPU: what `shaders/traverse.wgsl` needs, handed over once and kept until it changes.
 
-use super::boundary::LEAF;
 use super::cpu::{Counts, least_light};
-use super::{Cell, Geometry, Values};
 use crate::error::{Error, Result};
-use crate::gpu::Gpu;
+use crate::geometry::boundary::{BoundaryFace, LEAF};
+use crate::geometry::{Cell, Geometry, Values};
 use crate::gpu::buffers::{Buffer, Chunks};
 use crate::gpu::function;
 use crate::gpu::shader::{self, Array, Binding, Variant};
+use crate::gpu::{Gpu, Part, arrays};
 use crate::integral::Exact;
 use crate::mesh::faces::BOUNDARY;
 use crate::view::{Blend, Fan, View};
@@ -31,9 +31,6 @@ const FAR: f32 = 1e30;
 
 /// Opacity of a pixel whose ray the device did not finish.
 const UNFINISHED: f32 = -2e30;
-
-/// Stands for a value that is not finite; the shader takes all above 1e38 for such.
-const INVISIBLE: f32 = 3e38;
 
 /// Added to the boxes of the hierarchy on all sides: above all rounding in their intersection with a ray, as eyes that
 /// rays start from are at most [`NEAR_EYE`] away.
@@ -97,19 +94,6 @@ struct RawCounts {
     unused: u32,
 }
 
-/// What a frame depends on, apart from the view: each part is handed over again only after it was forgotten.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Part {
-    /// Cells and all that follows from them.
-    Mesh,
-    /// Where the points are.
-    Points,
-    /// The field's values.
-    Field,
-    /// The transfer function.
-    Function,
-}
-
 /// A frame as the device drew it.
 pub(crate) struct Drawn {
     /// Premultiplied colours; for [`Blend::Maximum`] the largest values instead.
@@ -165,26 +149,18 @@ impl Traverse {
         let gpu = &self.gpu;
         if self.cells.is_none() {
             let cells = Chunks::new(gpu, "cells", &geometry.cells, |c| *c)?;
-            let outer = |f: &super::boundary::BoundaryFace| Outer { points: f.points, cell: f.cell };
+            let outer = |f: &BoundaryFace| Outer { points: f.points, cell: f.cell };
             self.cells = Some([cells, Chunks::new(gpu, "faces", &geometry.boundary.faces, outer)?]);
         }
         if self.points.is_none() {
-            let points = Chunks::new(gpu, "points", &geometry.points, |&p| {
-                let [[x, y, z, _], [x_low, y_low, z_low, _]] = twice(p);
-                [x, y, z, x_low, y_low, z_low]
-            })?;
+            let points = arrays::points(gpu, geometry)?;
             let volume = |c: &Cell| six_volumes(c.corners.map(|p| geometry.points[p as usize]));
             let volumes = Chunks::new(gpu, "volumes", &geometry.cells, volume)?;
             let boxes = Chunks::new(gpu, "boxes", geometry.boundary.boxes(), outward)?;
             self.points = Some([points, volumes, boxes]);
         }
         if self.values.is_none() {
-            let all = match values {
-                Values::Point(v) | Values::Cell(v) => v.as_slice(),
-                Values::Corner(v) => v.as_flattened(),
-            };
-            let finite = |v: &[f32; N]| v.map(|v| if v.is_finite() { v } else { INVISIBLE });
-            self.values = Some(Chunks::new(gpu, "values", all, finite)?);
+            self.values = Some(arrays::values(gpu, values)?);
         }
         if self.function.is_none() {
             self.function = Some(function::upload(gpu, exact)?);
@@ -204,12 +180,8 @@ impl Traverse {
         view: &View,
     ) -> Result<Drawn> {
         self.upload(geometry, values, exact)?;
-        let association = match values {
-            Values::Point(_) => "POINT",
-            Values::Corner(_) => "CORNER",
-            Values::Cell(_) => "CELL",
-        };
-        let arrays = self.arrays::<N>()?;
+        let association = arrays::association(values);
+        let arrays = self.arrays()?;
         let variant = Variant { kind: exact.kind, direct: exact.direct };
         let source = program(&variant, association, view.blend(), &arrays);
         if self.program.as_ref().is_none_or(|p| p.0 != source) {
@@ -235,7 +207,7 @@ impl Traverse {
     }
 
     /// The arrays of group 1, in the order of [`Self::chunks`].
-    fn arrays<const N: usize>(&self) -> Result<[Array; 6]> {
+    fn arrays(&self) -> Result<[Array; 6]> {
         let names = [
             ("cells", "Cell"),
             ("faces", "Outer"),
@@ -392,7 +364,7 @@ fn program(variant: &Variant, association: &str, blend: Blend, arrays: &[Array])
     for (name, value) in [
         ("FAR", f64::from(FAR)),
         ("UNFINISHED", f64::from(UNFINISHED)),
-        ("INVISIBLE", f64::from(INVISIBLE)),
+        ("INVISIBLE", f64::from(arrays::INVISIBLE)),
         ("BLUR", f64::from(BLUR)),
         ("SLACK", f64::from(MARGIN)),
         ("ASIDE", f64::from(ASIDE)),
@@ -406,7 +378,7 @@ fn program(variant: &Variant, association: &str, blend: Blend, arrays: &[Array])
     );
     text += "const POINT = 0u;\nconst CORNER = 1u;\nconst CELL = 2u;\n";
     text += &format!("const ASSOCIATION = {association};\n\n");
-    text += "struct Point { x: f32, y: f32, z: f32, x_low: f32, y_low: f32, z_low: f32 }\n";
+    text += arrays::POINT;
     text += &shader::accessors(arrays);
     [&text, shader::CELL, shader::INTEGRAL, TRAVERSE].join("\n")
 }
@@ -426,12 +398,6 @@ fn ends(view: &View, fan: &Fan, scale: f64) -> Vec<f32> {
     pixels.into_par_iter().map(end).collect()
 }
 
-/// `v` as a sum of two vectors of f32.
-fn twice(v: DVec3) -> [[f32; 4]; 2] {
-    let high = v.as_vec3();
-    [high, (v - high.as_dvec3()).as_vec3()].map(|v| v.extend(0.0).to_array())
-}
-
 /// What the shader computes v · (1, i, j) from: the products of pixels and high parts are exact.
 fn affine([first, by_column, by_row]: [DVec3; 3]) -> [[[f32; 4]; 2]; 3] {
     let short = |v: DVec3| {
@@ -439,7 +405,7 @@ fn affine([first, by_column, by_row]: [DVec3; 3]) -> [[[f32; 4]; 2]; 3] {
         let low = (v - DVec3::from(high.map(f64::from))).as_vec3();
         [[high[0], high[1], high[2], 0.0], low.extend(0.0).to_array()]
     };
-    [twice(first), short(by_column), short(by_row)]
+    [arrays::twice(first).map(|[x, y, z]| [x, y, z, 0.0]), short(by_column), short(by_row)]
 }
 
 /// Six times the volume of a tetrahedron.

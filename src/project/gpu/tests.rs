@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::field::{Association, Component, Field, Kind};
+use crate::gpu::testing::{gpu, validated};
 use crate::mesh::{cells::Tetrahedra, generate};
 use crate::render::{Engine, Renderer};
 use crate::transfer::TransferFunction;
@@ -9,35 +10,9 @@ use crate::view::{Camera, Projection};
 use glam::{DVec3, dvec3};
 use wgpu::naga;
 
-/// The device to test: `HALITE_TEST_DEVICE`, or the first. Without any, tests are skipped, loudly; with
-/// `HALITE_REQUIRE_GPU=1` they fail.
-fn gpu() -> Option<Gpu> {
-    let name = std::env::var("HALITE_TEST_DEVICE").unwrap_or_else(|_| "0".into());
-    match Gpu::open(&DeviceChoice::Named(name)) {
-        Ok(gpu) => gpu,
-        Err(e) if std::env::var("HALITE_REQUIRE_GPU").is_ok_and(|v| v == "1") => panic!("{e}"),
-        Err(e) => {
-            eprintln!("SKIPPED, as there is no GPU to test: {e}");
-            None
-        }
-    }
-}
-
 fn arrays(chunks: usize) -> Vec<Array> {
     let names = [("cells", "vec4u"), ("points", "Point"), ("values", "Value")];
     names.map(|(name, element)| Array { name, element, chunks, shift: 22 }).to_vec()
-}
-
-fn validated(source: &str) -> naga::Module {
-    let module = match naga::front::wgsl::parse_str(source) {
-        Ok(module) => module,
-        Err(e) => panic!("{}", e.emit_to_string(source)),
-    };
-    let flags = naga::valid::ValidationFlags::all();
-    match naga::valid::Validator::new(flags, naga::valid::Capabilities::empty()).validate(&module) {
-        Ok(_) => module,
-        Err(e) => panic!("{}", e.emit_to_string(source)),
-    }
 }
 
 const KINDS: [Kind; 3] = [Kind::Scalar, Kind::Pair, Kind::Rgba];
@@ -99,7 +74,7 @@ fn layouts_match_their_rust_twins() {
                 ("Record", record),
                 ("Frame", size_of::<Frame>() as u64),
                 ("Part", size_of::<Slice>() as u64),
-                ("Point", size_of::<Point>() as u64),
+                ("Point", 24),
                 ("Table", 32),
             ];
             for (name, size) in rust {

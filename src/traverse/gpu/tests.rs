@@ -4,7 +4,9 @@ use super::*;
 use crate::cell::{Face, Projected};
 use crate::field::{Association, Component, Field, Kind, Normal};
 use crate::gpu::DeviceChoice;
+use crate::gpu::arrays::twice;
 use crate::gpu::function::{Function, Knot};
+use crate::gpu::testing::{choice, gpu, validated};
 use crate::image::Image;
 use crate::integral::Light;
 use crate::mesh::cells::Tetrahedra;
@@ -13,25 +15,6 @@ use crate::render::Renderer;
 use crate::transfer::{Convention, Emission, TransferFunction};
 use crate::view::{Camera, ClippingPlane, DepthBuffer, DepthKind, Projection};
 use wgpu::naga;
-
-/// The device to test: `HALITE_TEST_DEVICE`, or the first. Without any, tests are skipped, loudly; with
-/// `HALITE_REQUIRE_GPU=1` they fail.
-fn choice() -> Option<DeviceChoice> {
-    let name = std::env::var("HALITE_TEST_DEVICE").unwrap_or_else(|_| "0".into());
-    let choice = DeviceChoice::Named(name);
-    match Gpu::open(&choice) {
-        Ok(_) => Some(choice),
-        Err(e) if std::env::var("HALITE_REQUIRE_GPU").is_ok_and(|v| v == "1") => panic!("{e}"),
-        Err(e) => {
-            eprintln!("SKIPPED, as there is no GPU to test: {e}");
-            None
-        }
-    }
-}
-
-fn gpu() -> Option<Gpu> {
-    Gpu::open(&choice()?).unwrap()
-}
 
 /// Marsaglia's xorshift64 (2003).
 struct Random(u64);
@@ -78,18 +61,6 @@ fn arrays(chunks: usize) -> Vec<Array> {
         ("values", "Value"),
     ];
     names.map(|(name, element)| Array { name, element, chunks, shift: 22 }).to_vec()
-}
-
-fn validated(source: &str) -> naga::Module {
-    let module = match naga::front::wgsl::parse_str(source) {
-        Ok(module) => module,
-        Err(e) => panic!("{}", e.emit_to_string(source)),
-    };
-    let flags = naga::valid::ValidationFlags::all();
-    match naga::valid::Validator::new(flags, naga::valid::Capabilities::empty()).validate(&module) {
-        Ok(_) => module,
-        Err(e) => panic!("{}", e.emit_to_string(source)),
-    }
 }
 
 #[test]
@@ -265,7 +236,8 @@ fn places_beside_a_ray_are_as_accurate_as_they_are_near() {
             let origin = random.direction() * random.within(0.0, 4.0);
             let direction = random.direction() * random.within(0.5, 2.0);
             let aside = random.direction() * 10f64.powf(random.within(-7.0, 0.0));
-            [origin, direction, origin + direction * random.within(-2.0, 4.0) + aside].map(twice)
+            [origin, direction, origin + direction * random.within(-2.0, 4.0) + aside]
+                .map(|v| twice(v).map(|[x, y, z]| [x, y, z, 0.0]))
         })
         .collect();
     let variant = Variant { kind: Kind::Scalar, direct: false };

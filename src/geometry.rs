@@ -1,0 +1,219 @@
+//! The mesh as engines read it: coordinates near 0, points and cells where memory is near, and the field's values in that order.
+//!
+//! [`boundary`] finds the faces through which rays enter, [`contacts`] what touches without sharing faces.
+
+pub mod boundary;
+pub mod contacts;
+
+use crate::error::{Error, Result};
+use crate::field::{Association, Field};
+use crate::mesh::cells::Tetrahedra;
+use crate::mesh::faces::{BOUNDARY, Faces};
+use boundary::Boundary;
+use bytemuck::Zeroable;
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// One tetrahedron as engines see it: 32 bytes.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, bytemuck::Pod, Zeroable)]
+#[repr(C)]
+pub struct Cell {
+    /// Indices into [`Geometry::points`].
+    pub corners: [u32; 4],
+    /// `neighbours[k]` lies beyond the face opposite to corner k; [`BOUNDARY`] if nothing does.
+    pub neighbours: [u32; 4],
+}
+
+/// A mesh made ready to be drawn: coordinates relative to its centre and within [−1, 1], points and cells along a
+/// space-filling curve, points at one position made one.
+#[derive(Debug, Clone, Default)]
+pub struct Geometry {
+    /// The middle of the mesh's bounds, in world coordinates.
+    pub centre: DVec3,
+    /// Normalised coordinates are (world − centre) · scale; a power of two.
+    pub scale: f64,
+    /// Normalised positions.
+    pub points: Vec<DVec3>,
+    /// The tetrahedra.
+    pub cells: Vec<Cell>,
+    /// The boundary faces.
+    pub boundary: Boundary,
+    /// The mesh's point that each point is; of several at one position, one of them.
+    point_of: Vec<u32>,
+    /// The tetrahedron, as [`Tetrahedra`] counts, that each cell is.
+    tetrahedron_of: Vec<u32>,
+    /// True if several points of the mesh share a position.
+    welded: bool,
+}
+
+impl Geometry {
+    /// Prepares `tetrahedra`, whose corners index into `points`: see [`Tetrahedra::points`].
+    pub fn new(points: &[DVec3], tetrahedra: &Tetrahedra, faces: &Faces) -> Self {
+        let corners = &tetrahedra.corners;
+        let [low, high] = bounds(points, corners);
+        let (centre, scale) = normalisation(low, high);
+        let normalised = |p: u32| (points[p as usize] - centre) * scale;
+
+        let weld = |p: u32| faces.weld.as_ref().map_or(p, |w| w[p as usize]);
+        let mut used = vec![false; points.len()];
+        corners.iter().flatten().for_each(|&p| used[weld(p) as usize] = true);
+        let used: Vec<u32> = (0..points.len() as u32).filter(|&p| used[p as usize]).collect();
+        let point_of = along_curve(&used, normalised);
+        let mut new_point = vec![0; points.len()];
+        point_of.iter().enumerate().for_each(|(new, &old)| new_point[old as usize] = new as u32);
+
+        let all: Vec<u32> = (0..corners.len() as u32).collect();
+        let tetrahedron_of =
+            along_curve(&all, |t| corners[t as usize].iter().map(|&p| normalised(p)).sum::<DVec3>() / 4.0);
+        let mut new_cell = vec![0; corners.len()];
+        tetrahedron_of.iter().enumerate().for_each(|(new, &old)| new_cell[old as usize] = new as u32);
+        let cells: Vec<Cell> = tetrahedron_of
+            .par_iter()
+            .map(|&t| Cell {
+                corners: corners[t as usize].map(|p| new_point[weld(p) as usize]),
+                neighbours: faces.neighbours[t as usize]
+                    .map(|n| if n == BOUNDARY { BOUNDARY } else { new_cell[n as usize] }),
+            })
+            .collect();
+        let points: Vec<DVec3> = point_of.par_iter().map(|&p| normalised(p)).collect();
+        let boundary = faces
+            .boundary
+            .par_iter()
+            .map(|&(t, k)| boundary::BoundaryFace {
+                points: faces.outward(corners, (t, k)).map(|p| new_point[p as usize]),
+                cell: new_cell[t as usize],
+            })
+            .collect();
+        let boundary = Boundary::new(&points, boundary);
+        Geometry { centre, scale, points, cells, boundary, point_of, tetrahedron_of, welded: faces.weld.is_some() }
+    }
+
+    /// Prepares `tetrahedra` for engines that do not walk: cells have no neighbours, and there is no boundary.
+    pub fn unconnected(points: &[DVec3], tetrahedra: &Tetrahedra) -> Self {
+        let neighbours = vec![[BOUNDARY; 4]; tetrahedra.corners.len()];
+        Self::new(points, tetrahedra, &Faces { neighbours, ..Faces::default() })
+    }
+
+    /// Moves the points: `points` are as many as before, in world coordinates. Cells keep their neighbours, so none may turn inside
+    /// out, and points that shared a position still must.
+    pub fn set_points(&mut self, points: &[DVec3]) {
+        let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+        let [low, high] = self
+            .point_of
+            .par_iter()
+            .fold(|| none, |[l, h], &p| [l.min(points[p as usize]), h.max(points[p as usize])])
+            .reduce(|| none, |a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+        if low.x <= high.x {
+            (self.centre, self.scale) = normalisation(low, high);
+        }
+        let (centre, scale) = (self.centre, self.scale);
+        self.points = self.point_of.par_iter().map(|&p| (points[p as usize] - centre) * scale).collect();
+        self.boundary.refit(&self.points);
+    }
+
+    /// Bytes that a walk reads.
+    pub fn bytes(&self) -> u64 {
+        (size_of_val(&*self.points) + size_of_val(&*self.cells)) as u64 + self.boundary.bytes()
+    }
+}
+
+/// The values of a field with `N` components, in the order of a [`Geometry`].
+#[derive(Debug, Clone)]
+pub enum Values<const N: usize> {
+    /// One for each point.
+    Point(Vec<[f32; N]>),
+    /// One for each corner of each cell: the field jumps between cells that share a position.
+    Corner(Vec<[[f32; N]; 4]>),
+    /// One for each cell.
+    Cell(Vec<[f32; N]>),
+}
+
+impl<const N: usize> Values<N> {
+    /// Brings the values of `field` into the order of `geometry`, made from `tetrahedra`.
+    ///
+    /// # Errors
+    /// [`Error::Field`] if there are not as many values as points or cells.
+    pub fn new(
+        geometry: &Geometry,
+        tetrahedra: &Tetrahedra,
+        points: usize,
+        cells: usize,
+        field: &Field,
+    ) -> Result<Self> {
+        let (what, count) = match field.association() {
+            Association::Point => ("points", points),
+            Association::Cell => ("cells", cells),
+        };
+        if field.values().len() != count * N {
+            return Err(Error::Field(format!("the field has {} values for {count} {what}", field.values().len() / N)));
+        }
+        let values = match field.association() {
+            Association::Point => tetrahedra.values(field.values(), N),
+            Association::Cell => field.values().into(),
+        };
+        let (values, []) = values.as_chunks::<N>() else { return Err(Error::Field("uneven field".into())) };
+        let value = |i: u32| values[i as usize];
+        if field.association() == Association::Cell {
+            let cell = |t: u32| tetrahedra.cell.as_ref().map_or(t, |c| c[t as usize]);
+            return Ok(Values::Cell(geometry.tetrahedron_of.par_iter().map(|&t| value(cell(t))).collect()));
+        }
+        let at_points: Vec<[f32; N]> = geometry.point_of.par_iter().map(|&p| value(p)).collect();
+        let own = |t: u32| tetrahedra.corners[t as usize].map(value);
+        let bits = |v: [f32; N]| v.map(f32::to_bits);
+        let continuous = !geometry.welded
+            || geometry.cells.par_iter().zip(&geometry.tetrahedron_of).all(|(cell, &t)| {
+                let own = own(t);
+                (0..4).all(|k| bits(at_points[cell.corners[k] as usize]) == bits(own[k]))
+            });
+        if continuous {
+            return Ok(Values::Point(at_points));
+        }
+        Ok(Values::Corner(geometry.tetrahedron_of.par_iter().map(|&t| own(t)).collect()))
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> u64 {
+        match self {
+            Values::Point(v) | Values::Cell(v) => size_of_val(&**v) as u64,
+            Values::Corner(v) => size_of_val(&**v) as u64,
+        }
+    }
+}
+
+/// Centre and scale that bring what lies between two corners into [−1, 1]³.
+fn normalisation(low: DVec3, high: DVec3) -> (DVec3, f64) {
+    let (centre, radius) = (low / 2.0 + high / 2.0, (high / 2.0 - low / 2.0).max_element());
+    // A power of two scales without rounding; f64 has none for radii below 1e-307, which no mesh has.
+    let scale = if radius > 0.0 { (-radius.log2().ceil()).clamp(-1000.0, 1000.0).exp2() } else { 1.0 };
+    (centre, scale)
+}
+
+/// Smallest and largest coordinates of the points that `corners` name; zero if there are none.
+fn bounds(points: &[DVec3], corners: &[[u32; 4]]) -> [DVec3; 2] {
+    let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+    let [low, high] = corners
+        .par_iter()
+        .fold(|| none, |b, c| c.iter().fold(b, |[l, h], &p| [l.min(points[p as usize]), h.max(points[p as usize])]))
+        .reduce(|| none, |a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+    if low.x <= high.x { [low, high] } else { [DVec3::ZERO; 2] }
+}
+
+/// `items` ordered along the Morton curve through their places in [−1, 1]³; equal places keep their order.
+fn along_curve(items: &[u32], place: impl Fn(u32) -> DVec3 + Sync) -> Vec<u32> {
+    let mut keyed: Vec<(u64, u32)> = items.par_iter().map(|&i| (morton(place(i)), i)).collect();
+    keyed.par_sort_unstable();
+    keyed.into_par_iter().map(|(_, i)| i).collect()
+}
+
+/// The index of `p`, in [−1, 1]³, on the Morton curve of 2²¹ steps per axis.
+fn morton(p: DVec3) -> u64 {
+    let spread = |x: f64| {
+        let mut x = ((x + 1.0) * f64::from(1 << 20)).clamp(0.0, f64::from((1 << 21) - 1)) as u64;
+        x = (x | x << 32) & 0x1f_0000_0000_ffff;
+        x = (x | x << 16) & 0x1f_0000_ff00_00ff;
+        x = (x | x << 8) & 0x100f_00f0_0f00_f00f;
+        x = (x | x << 4) & 0x10c3_0c30_c30c_30c3;
+        (x | x << 2) & 0x1249_2492_4924_9249
+    };
+    spread(p.x) << 2 | spread(p.y) << 1 | spread(p.z)
+}

@@ -1,0 +1,52 @@
+//! The mesh's arrays as shaders of all engines read them.
+
+use super::Gpu;
+use super::buffers::Chunks;
+use crate::error::Result;
+use crate::geometry::{Geometry, Values};
+use glam::DVec3;
+
+/// An element of [`points`]: each coordinate is the sum of two.
+pub(crate) const POINT: &str = "struct Point { x: f32, y: f32, z: f32, x_low: f32, y_low: f32, z_low: f32 }\n";
+
+/// Stands for a value that is not finite; shaders take all above 1e38 for such.
+pub(crate) const INVISIBLE: f32 = 3e38;
+
+/// The normalised positions.
+///
+/// # Errors
+/// Those of [`Chunks::new`].
+pub(crate) fn points(gpu: &Gpu, geometry: &Geometry) -> Result<Chunks> {
+    Chunks::new(gpu, "points", &geometry.points, |&p| {
+        let [[x, y, z], [x_low, y_low, z_low]] = twice(p);
+        [x, y, z, x_low, y_low, z_low]
+    })
+}
+
+/// The values, one after another.
+///
+/// # Errors
+/// Those of [`Chunks::new`].
+pub(crate) fn values<const N: usize>(gpu: &Gpu, values: &Values<N>) -> Result<Chunks> {
+    let all = match values {
+        Values::Point(v) | Values::Cell(v) => v.as_slice(),
+        Values::Corner(v) => v.as_flattened(),
+    };
+    let finite = |v: &[f32; N]| v.map(|v| if v.is_finite() { v } else { INVISIBLE });
+    Chunks::new(gpu, "values", all, finite)
+}
+
+/// What the shaders call their way of looking values up.
+pub(crate) fn association<const N: usize>(values: &Values<N>) -> &'static str {
+    match values {
+        Values::Point(_) => "POINT",
+        Values::Corner(_) => "CORNER",
+        Values::Cell(_) => "CELL",
+    }
+}
+
+/// `v` as a sum of two vectors of f32.
+pub(crate) fn twice(v: DVec3) -> [[f32; 3]; 2] {
+    let high = v.as_vec3();
+    [high, (v - high.as_dvec3()).as_vec3()].map(|v| v.to_array())
+}
