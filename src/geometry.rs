@@ -111,6 +111,16 @@ impl Geometry {
         self.boundary.refit(&self.points);
     }
 
+    /// The longest edge of a cell, in normalised units: no segment of a ray is longer.
+    pub fn longest_edge(&self) -> f64 {
+        let edges = |c: &Cell| {
+            let p = c.corners.map(|i| self.points[i as usize]);
+            let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+            pairs.iter().map(|&(i, j)| p[i].distance_squared(p[j])).fold(0.0, f64::max)
+        };
+        self.cells.par_iter().map(edges).reduce(|| f64::MIN_POSITIVE, f64::max).sqrt()
+    }
+
     /// Bytes that a walk reads.
     pub fn bytes(&self) -> u64 {
         (size_of_val(&*self.points) + size_of_val(&*self.cells)) as u64 + self.boundary.bytes()

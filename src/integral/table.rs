@@ -1,110 +1,49 @@
 //! Pre-integrated tables: what a segment does, looked up by its values in front and behind and its length.
 //!
-//! Röttger, Kraus & Ertl (2000) have uniform lengths. Kraus, Qiao & Ebert (2004, section 3) have logarithmic ones, in slices for
-//! 0, Δl, 2 Δl, 4 Δl, … up to l_max, with Δl = 2^−(n_r−2) l_max; their equation 1 maps a length l to the coordinate
-//! r = (max(log₂(l/Δl), 0) + min(l/Δl, 1)) / n_r + 1 / (2 n_r).
-//!
-//! Between slices the table is interpolated linearly in r, but in thin cells colour and opacity rise linearly with l: at
-//! l = 2^(k+f) Δl they come out (1 + f) 2^−f times too great, 4.1 % on average and up to 6.1 %, however many slices there
-//! are. What hardly depends on the length has no such bias: [`Kind::LogNormalised`] keeps the mean extinction ρ̂ = −ln(1−α)/l
-//! and the colour C/α, so that α = 1 − e^{−l ρ̂}.
+//! Each form is judged by the exact integral, and read here as a device's linear filter reads it: [`Table`] has all three
+//! parameters, [`Polynomial`] the values only, and [`Cylindrical`] planes of two parameters that hold a projected cell each.
+
+mod cylindrical;
+mod polynomial;
+mod volume;
+
+pub use cylindrical::Cylindrical;
+pub use polynomial::Polynomial;
+pub use volume::{Kind, Table, coordinate, length};
 
 use super::{Exact, Light};
 use crate::field;
-use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
-/// What a table holds, and for which lengths.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Kind {
-    /// Premultiplied colour and opacity, for lengths that are equally far apart.
-    Uniform,
-    /// The same for logarithmic lengths, as published.
-    Log,
-    /// Colour over opacity (for direct emission: over the length that is seen) and mean extinction, for logarithmic lengths.
-    #[default]
-    LogNormalised,
+/// Whether a function can be tabulated: tables have no room for fields of several components.
+fn is_scalar(exact: &Exact<f64>) -> bool {
+    exact.kind == field::Kind::Scalar
 }
 
-/// A table of `size[0]` values in front, `size[1]` values behind and `size[2]` lengths.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Table {
-    /// Its kind.
-    pub kind: Kind,
-    /// Texels along each axis.
-    pub size: [u32; 3],
-    /// The length of the last slice, in normalised units.
-    pub longest: f64,
-    /// Emission is not multiplied by extinction.
-    pub direct: bool,
-    /// Colour and opacity, or what stands for them; the value in front varies fastest, the length slowest. f32 would not change
-    /// what f64 finds, but for rounding it once.
-    pub texels: Vec<[f32; 4]>,
+/// The normalised scalar of texel `i` of `n`.
+fn value(i: u32, n: u32) -> f64 {
+    -1.0 + 2.0 * f64::from(i) / f64::from(n - 1)
 }
 
-/// Optical depths beyond this are opaque, and so is a mean extinction that gives it to the thinnest slice but 0.
-const OPAQUE_DEPTH: f64 = 100.0;
-
-/// The piecewise linear function along one segment: extinction and colour in front and behind of each piece, and its share of
-/// the length.
-type Pieces = Vec<([f64; 4], [f64; 4], f64)>;
-
-impl Table {
-    /// Integrates `exact` over segments of up to `longest` normalised units, on the current rayon pool. `None` for fields of
-    /// several components, of which a table has no room, and for sizes that are no table: less than 2 × 2 × 3 texels.
-    pub fn new(exact: &Exact<f64>, kind: Kind, size: [u32; 3], longest: f64) -> Option<Self> {
-        if exact.kind != field::Kind::Scalar || size[0] < 2 || size[1] < 2 || size[2] < 3 {
-            return None;
-        }
-        let lengths: Vec<f64> = (0..size[2]).map(|k| length(kind, size[2], longest, k)).collect();
-        let value = |i: u32, n: u32| -1.0 + 2.0 * f64::from(i) / f64::from(n - 1);
-        let slice = size[0] as usize * size[1] as usize;
-        let columns: Vec<Vec<[f32; 4]>> = (0..slice)
-            .into_par_iter()
-            .map(|at| {
-                let (front, back) = (value(at as u32 % size[0], size[0]), value(at as u32 / size[0], size[1]));
-                let mut pieces = Pieces::new();
-                exact.for_each_piece(&[front], &[back], |f, b, share| pieces.push((f, b, share)));
-                let column = lengths.iter().map(|&l| match kind {
-                    Kind::LogNormalised => normalised(exact, front, back, &pieces, l, lengths[1]),
-                    _ => published(exact, front, back, l),
-                });
-                column.map(|t| t.map(|c| c as f32)).collect()
-            })
-            .collect();
-        let texels = (0..lengths.len()).flat_map(|k| columns.iter().map(move |c| c[k])).collect();
-        Some(Table { kind, size, longest, direct: exact.direct, texels })
-    }
-
-    /// The largest of each channel, by which it is divided where texels are in [0, 1].
-    pub fn greatest(&self) -> [f32; 4] {
-        let most = self.texels.iter().fold([0.0f32; 4], |m, t| [0, 1, 2, 3].map(|k| m[k].max(t[k])));
-        let colour = most[0].max(most[1]).max(most[2]).max(f32::MIN_POSITIVE);
-        [colour, colour, colour, if self.kind == Kind::LogNormalised { most[3].max(f32::MIN_POSITIVE) } else { 1.0 }]
-    }
+/// Between which two of `n` texels a place in [0, 1] lies, and the weight of the second.
+fn between(x: f64, n: u32) -> [(usize, f64); 2] {
+    let at = x.clamp(0.0, 1.0) * f64::from(n - 1);
+    let low = (at as u32).min(n - 2);
+    let share = at - f64::from(low);
+    [(low as usize, 1.0 - share), (low as usize + 1, share)]
 }
 
-/// The length of slice `k` of `n`.
-pub fn length(kind: Kind, n: u32, longest: f64, k: u32) -> f64 {
-    match kind {
-        Kind::Uniform => longest * f64::from(k) / f64::from(n - 1),
-        Kind::Log | Kind::LogNormalised if k == 0 => 0.0,
-        Kind::Log | Kind::LogNormalised => longest * (f64::from(k) - f64::from(n - 1)).exp2(),
-    }
-}
-
-/// Where in a table of `n` slices, as a texture coordinate, the length `l` is: equation 1, or its uniform counterpart.
-pub fn coordinate(kind: Kind, n: u32, longest: f64, l: f64) -> f64 {
-    let n = f64::from(n);
-    let slices = match kind {
-        Kind::Uniform => l / longest * (n - 1.0),
-        Kind::Log | Kind::LogNormalised => {
-            let steps = l / (longest * (2.0 - n).exp2());
-            steps.log2().max(0.0) + steps.min(1.0)
-        }
+/// Colour and opacity of a segment `l` long, from its colour over what is seen of it and its mean extinction.
+fn reconstructed(color: [f64; 3], density: f64, l: f64, direct: bool) -> [f64; 4] {
+    let alpha = -(-l * density).exp_m1();
+    let seen = if !direct {
+        alpha
+    } else if density > 0.0 {
+        alpha / density
+    } else {
+        l
     };
-    (slices + 0.5) / n
+    let [r, g, b] = color.map(|c| c * seen);
+    [r, g, b, alpha]
 }
 
 fn light(exact: &Exact<f64>, front: f64, back: f64, l: f64) -> Light<f64> {
@@ -113,137 +52,11 @@ fn light(exact: &Exact<f64>, front: f64, back: f64, l: f64) -> Light<f64> {
     light
 }
 
+/// Premultiplied colour and opacity.
 fn published(exact: &Exact<f64>, front: f64, back: f64, l: f64) -> [f64; 4] {
     let Light { color: [r, g, b], through } = light(exact, front, back, l);
     [r, g, b, 1.0 - through]
 }
 
-fn normalised(exact: &Exact<f64>, front: f64, back: f64, pieces: &Pieces, l: f64, thinnest: f64) -> [f64; 4] {
-    let sum =
-        |of: &dyn Fn(&[f64; 4], &[f64; 4]) -> f64| pieces.iter().map(|(f, b, share)| share * of(f, b)).sum::<f64>();
-    let extinction = sum(&|f, b| (f[0] + b[0]) / 2.0);
-    let density = extinction.min(OPAQUE_DEPTH / thinnest);
-    let depth = extinction * l;
-    // Without length or extinction: the limit, in which nothing hides anything.
-    if depth < 1e-9 {
-        let mean = |k: usize| {
-            if exact.direct || extinction <= 0.0 {
-                return colour_of(exact, front, back, pieces, k);
-            }
-            let weighed =
-                |f: &[f64; 4], b: &[f64; 4]| (2.0 * f[0] * f[k] + f[0] * b[k] + b[0] * f[k] + 2.0 * b[0] * b[k]) / 6.0;
-            sum(&weighed) / extinction
-        };
-        return [mean(1), mean(2), mean(3), density];
-    }
-    let Light { color, through } = light(exact, front, back, l);
-    let alpha = if depth > 1e-3 { 1.0 - through } else { -(-depth).exp_m1() };
-    let seen = if exact.direct { alpha / extinction } else { alpha };
-    let [r, g, b] = color.map(|c| c / seen);
-    [r, g, b, density]
-}
-
-/// The mean colour of a segment that may have no extinction, and so no pieces.
-fn colour_of(exact: &Exact<f64>, front: f64, back: f64, pieces: &Pieces, k: usize) -> f64 {
-    if pieces.is_empty() {
-        return (exact.opacity.color_at(front, k) + exact.opacity.color_at(back, k)) / 2.0;
-    }
-    pieces.iter().map(|(f, b, share)| share * (f[k] + b[k]) / 2.0).sum()
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::field::Normal;
-    use crate::transfer::{Emission, TransferFunction};
-
-    fn exact(opacity: &[(f64, f64)], emission: Emission) -> Exact<f64> {
-        let color = vec![(-1.0, [1.0, 0.2, 0.0]), (0.3, [0.0, 0.5, 0.9]), (1.0, [0.4, 0.4, 0.4])];
-        let transfer = TransferFunction::new(color, opacity.to_vec(), 1.0).unwrap().with_emission(emission).unwrap();
-        Exact::new(&transfer, field::Kind::Scalar, &[Normal { mid: 0.0, half: 1.0 }; 4], 1.0)
-    }
-
-    /// The colour and opacity that a linear filter finds for values at texels and any length, in f64.
-    fn looked_up(table: &Table, front: u32, back: u32, l: f64) -> [f64; 4] {
-        let n = table.size[2];
-        let at = (coordinate(table.kind, n, table.longest, l) * f64::from(n) - 0.5).clamp(0.0, f64::from(n - 1));
-        let texel = |k: u32| table.texels[((k * table.size[1] + back) * table.size[0] + front) as usize].map(f64::from);
-        let (low, high) = (texel(at as u32), texel((at as u32 + 1).min(n - 1)));
-        let t: [f64; 4] = std::array::from_fn(|k| low[k] + (high[k] - low[k]) * at.fract());
-        if table.kind != Kind::LogNormalised {
-            return t;
-        }
-        let alpha = -(-l * t[3]).exp_m1();
-        let seen = if !table.direct {
-            alpha
-        } else if t[3] > 0.0 {
-            alpha / t[3]
-        } else {
-            l
-        };
-        [t[0] * seen, t[1] * seen, t[2] * seen, alpha]
-    }
-
-    #[test]
-    fn slices_are_where_equation_1_puts_them() {
-        for kind in [Kind::Log, Kind::LogNormalised, Kind::Uniform] {
-            for n in [4, 16] {
-                for k in 0..n {
-                    let at = coordinate(kind, n, 3.0, length(kind, n, 3.0, k)) * f64::from(n) - 0.5;
-                    assert!((at - f64::from(k)).abs() < 1e-12, "{kind:?}: slice {k} of {n} is at {at}");
-                }
-            }
-        }
-        // Linear up to Δl: figure 6.
-        let [half, one] = [0.5, 1.0].map(|x| coordinate(Kind::Log, 8, 64.0, x) * 8.0 - 0.5);
-        assert!((half - 0.5).abs() < 1e-12 && (one - 1.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn texels_hold_the_exact_integral() {
-        let ramp = [(-1.0, 0.0), (0.0, 0.0), (0.2, 3.0), (1.0, 0.5)];
-        for emission in [Emission::Chromatic, Emission::Direct { scale: 0.7 }] {
-            let exact = exact(&ramp, emission);
-            for kind in [Kind::Log, Kind::LogNormalised, Kind::Uniform] {
-                let table = Table::new(&exact, kind, [17, 17, 9], 2.0).unwrap();
-                for (front, back, k) in
-                    [(0, 16, 8), (3, 12, 5), (12, 3, 8), (9, 9, 2), (16, 15, 1), (2, 3, 4), (4, 4, 0)]
-                {
-                    let value = |i: u32| -1.0 + f64::from(i) / 8.0;
-                    let l = length(kind, 9, 2.0, k);
-                    let (got, want) =
-                        (looked_up(&table, front, back, l), published(&exact, value(front), value(back), l));
-                    for c in 0..4 {
-                        assert!((got[c] - want[c]).abs() < 1e-6, "{kind:?} {front} {back} {k}: {got:?}, not {want:?}");
-                    }
-                }
-            }
-        }
-        assert_eq!(Table::new(&exact(&ramp, Emission::Chromatic), Kind::Log, [1, 2, 9], 1.0), None);
-    }
-
-    /// The bias of the published table, and that it is none of the normalised one.
-    #[test]
-    fn logarithmic_lengths_are_biased_unless_normalised() {
-        let exact = exact(&[(-1.0, 0.02), (1.0, 0.02)], Emission::Chromatic);
-        for n in [8, 16, 64] {
-            let bias = |kind: Kind| {
-                let table = Table::new(&exact, kind, [2, 2, n], 0.25).unwrap();
-                let (mut sum, mut most) = (0.0, 0.0f64);
-                for i in 0..1000 {
-                    // Thin: three slices below the last half.
-                    let l = 0.25 * (-4.0 + 3.0 * (f64::from(i) + 0.5) / 1000.0).exp2() / 16.0
-                        * if n == 8 { 8.0 } else { 1.0 };
-                    let over = looked_up(&table, 0, 1, l)[3] / published(&exact, -1.0, 1.0, l)[3] - 1.0;
-                    sum += over / 1000.0;
-                    most = most.max(over.abs());
-                }
-                (sum, most)
-            };
-            let (mean, most) = bias(Kind::Log);
-            assert!((mean - 0.0407).abs() < 2e-3 && (most - 0.0615).abs() < 2e-3, "{n}: {mean}, {most}");
-            let (_, most) = bias(Kind::LogNormalised);
-            assert!(most < 1e-6, "{n}: {most}");
-        }
-    }
-}
+mod tests;

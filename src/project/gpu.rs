@@ -7,7 +7,7 @@
 use super::frame::{FAR, FILLED, Frame, Limits, Seen, filled};
 use super::{Coloring, Compositing, Counts, Fragments, Order, Switches, Target, Texels, Thickness};
 use crate::error::{Error, Result};
-use crate::geometry::{Cell, Geometry, Values};
+use crate::geometry::{Geometry, Values};
 use crate::gpu::buffers::{Buffer, Chunks};
 use crate::gpu::raster::{self, Readback, Slot, Texture};
 use crate::gpu::shader::{self, Array, Variant};
@@ -369,7 +369,7 @@ impl Project {
             None => OnDevice::new(gpu, [1; 3], wgpu::TextureFormat::Rgba8Unorm, &[0; 4], [0.0; 8])?,
             Some(kind) => {
                 let format = texel_format(gpu, texels)?;
-                let longest = *self.longest.get_or_insert_with(|| longest_edge(geometry));
+                let longest = *self.longest.get_or_insert_with(|| geometry.longest_edge());
                 let bytes = size.iter().fold(16, |n: u64, &s| n.saturating_mul(u64::from(s)));
                 if bytes > MOST_TABLE {
                     return Err(Error::Render(format!("a table of {size:?} texels takes {bytes} bytes; choose less")));
@@ -759,16 +759,6 @@ fn texel_format(gpu: &Gpu, texels: Texels) -> Result<wgpu::TextureFormat> {
         return Ok(format);
     }
     Err(Error::Device(format!("{} has no {what}; use other texels for the table", gpu.adapter.name)))
-}
-
-/// The longest edge of a cell, in normalised units.
-fn longest_edge(geometry: &Geometry) -> f64 {
-    let edges = |c: &Cell| {
-        let p = c.corners.map(|i| geometry.points[i as usize]);
-        let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
-        pairs.iter().map(|&(i, j)| p[i].distance_squared(p[j])).fold(0.0, f64::max)
-    };
-    geometry.cells.par_iter().map(edges).reduce(|| f64::MIN_POSITIVE, f64::max).sqrt()
 }
 
 impl Ordered {

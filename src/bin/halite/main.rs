@@ -10,6 +10,7 @@ mod parse;
 mod progress;
 mod render;
 mod study;
+mod tables;
 mod variant;
 
 use anyhow::Result;
@@ -38,6 +39,7 @@ enum Command {
     Info(info::Options),
     Bench(Box<bench::Options>),
     Study(Box<study::Options>),
+    Tables(Box<tables::Options>),
     Demo(demo::Options),
 }
 
@@ -78,6 +80,7 @@ fn run(cli: Cli) -> Result<()> {
         }
         Command::Bench(options) => bench::run(&options, cli.threads),
         Command::Study(options) => study::run(&options, cli.threads),
+        Command::Tables(options) => tables::run(&options, cli.threads),
         Command::Demo(options) => demo::run(&options, &mut Renderer::new(cli.threads)?),
     }
 }

@@ -1,0 +1,86 @@
+//! The table in sheared cylinder coordinates (Röttger & Ertl 2002, section 4).
+//!
+//! Where a projected cell is thin, l = 0 and s_f = s_b: all its fragments lie on a plane through the front diagonal of the
+//! table. So planes around that diagonal are sampled, each a square of two parameters, and the two nearest are interpolated.
+//! A place is told by (a, s, t) in [0, 1]³: which plane, how far from the diagonal, and where along it; equation 9 maps it to
+//! (S_f, S_b, l), scalars in [0, 1] and l over the longest length, and equation 10 back.
+
+use super::{between, is_scalar, published};
+use crate::integral::Exact;
+use rayon::prelude::*;
+
+/// Colour and opacity on `planes` planes of `size` × `size` texels.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cylindrical {
+    /// Planes around the diagonal, at equal steps of a from 0 to 1.
+    pub planes: u32,
+    /// Texels along both axes of a plane; s varies fastest, then t, then the plane.
+    pub size: u32,
+    /// The longest length, in normalised units.
+    pub longest: f64,
+    /// Premultiplied colour and opacity; where S_f would leave [0, 1], those of its nearer end.
+    pub texels: Vec<[f32; 4]>,
+}
+
+impl Cylindrical {
+    /// Integrates `exact` over segments of up to `longest` normalised units, on the current rayon pool. `None` for fields of
+    /// several components, and sizes less than 2.
+    pub fn new(exact: &Exact<f64>, planes: u32, size: u32, longest: f64) -> Option<Self> {
+        if !is_scalar(exact) || planes < 2 || size < 2 {
+            return None;
+        }
+        let share = |i: u32, n: u32| f64::from(i) / f64::from(n - 1);
+        let texel = |i: u32| {
+            let [front, back, l] =
+                place(share(i / size / size, planes), share(i % size, size), share(i / size % size, size));
+            let [front, back] = [front, back].map(|s| 2.0 * s.clamp(0.0, 1.0) - 1.0);
+            published(exact, front, back, l * longest).map(|c| c as f32)
+        };
+        let texels = (0..planes.checked_mul(size)?.checked_mul(size)?).into_par_iter().map(texel).collect();
+        Some(Cylindrical { planes, size, longest, texels })
+    }
+
+    /// Premultiplied colour and opacity of a segment, as a linear filter finds them on the two nearest planes.
+    pub fn look_up(&self, front: f64, back: f64, l: f64) -> [f64; 4] {
+        let [a, s, t] = coordinates((front + 1.0) / 2.0, (back + 1.0) / 2.0, l / self.longest);
+        let size = self.size as usize;
+        let mut sum = [0.0; 4];
+        for (plane, of_plane) in between(a, self.planes) {
+            for (j, v) in between(t, self.size) {
+                for (i, u) in between(s, self.size) {
+                    let texel = self.texels[(plane * size + j) * size + i];
+                    sum = std::array::from_fn(|k| sum[k] + of_plane * u * v * f64::from(texel[k]));
+                }
+            }
+        }
+        sum
+    }
+
+    /// Bytes of its texels as 32-bit floats.
+    pub fn bytes(&self) -> u64 {
+        size_of_val(&*self.texels) as u64
+    }
+}
+
+/// Equation 9: (S_f, S_b, l) of (a, s, t).
+pub(super) fn place(a: f64, s: f64, t: f64) -> [f64; 3] {
+    match a {
+        _ if a <= 0.25 => [t + s, t, 4.0 * a * s],
+        _ if a <= 0.5 => [t + 4.0 * (0.5 - a) * s, t, s],
+        _ if a <= 0.75 => [t - 4.0 * (a - 0.5) * s, t, s],
+        _ => [t - s, t, 4.0 * (1.0 - a) * s],
+    }
+}
+
+/// Equation 10: (a, s, t) of (S_f, S_b, l).
+pub(super) fn coordinates(front: f64, back: f64, l: f64) -> [f64; 3] {
+    let d = front - back;
+    let [a, s] = match d {
+        _ if d == 0.0 && l == 0.0 => [0.0, 0.0],
+        _ if d >= 0.0 && l <= d => [0.25 * l / d, d],
+        _ if d >= 0.0 => [0.5 - 0.25 * d / l, l],
+        _ if l > -d => [0.5 - 0.25 * d / l, l],
+        _ => [1.0 + 0.25 * l / d, -d],
+    };
+    [a, s, back]
+}

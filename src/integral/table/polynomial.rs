@@ -1,0 +1,99 @@
+//! The separated table (Guthe, Röttger, Schieber, Straßer & Ertl 2002, section 3).
+//!
+//! Opacity needs two parameters only: with the mean extinction ρ̂(s_f, s_b) = ∫₀¹ ρ(s_f + t (s_b − s_f)) dt it is
+//! α = 1 − e^{−l ρ̂}. The colour over α hardly depends on the length: it is a polynomial of degree n in l/l_max, through its
+//! values at l = (i/n) l_max, the first of which is its limit. So n + 1 tables of two parameters stand for one of three.
+
+use super::volume::{Pieces, normalised};
+use super::{between, is_scalar, reconstructed, value};
+use crate::integral::Exact;
+use rayon::prelude::*;
+
+/// Coefficients of polynomials and mean extinctions, for `size` × `size` values in front and behind.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Polynomial {
+    /// Of the polynomials: at least 1.
+    pub degree: u32,
+    /// Texels along both axes; the value in front varies fastest.
+    pub size: u32,
+    /// The length at which polynomials end, in normalised units.
+    pub longest: f64,
+    /// Emission is not multiplied by extinction: polynomials are of colour over what is seen of the length.
+    pub direct: bool,
+    /// For each power of l / l_max: red, green and blue; with the first, the mean extinction per normalised unit.
+    pub texels: Vec<Vec<[f32; 4]>>,
+}
+
+/// A sum of powers that goes through points at 0, 1/n, …, 1: the rows give its coefficients from the values there.
+type Inverse = Vec<Vec<f64>>;
+
+impl Polynomial {
+    /// Integrates `exact` over segments of up to `longest` normalised units, on the current rayon pool. `None` for fields of
+    /// several components, less than 2 texels along an axis, and degrees that are not 1 to 8: points at equal distances give no
+    /// better ones.
+    pub fn new(exact: &Exact<f64>, degree: u32, size: u32, longest: f64) -> Option<Self> {
+        if !is_scalar(exact) || size < 2 || !(1..=8).contains(&degree) {
+            return None;
+        }
+        let inverse = inverse(degree as usize);
+        let lengths: Vec<f64> = (0..=degree).map(|i| longest * f64::from(i) / f64::from(degree)).collect();
+        let columns: Vec<Vec<[f32; 4]>> = (0..size * size)
+            .into_par_iter()
+            .map(|at| {
+                let (front, back) = (value(at % size, size), value(at / size, size));
+                let mut pieces = Pieces::new();
+                exact.for_each_piece(&[front], &[back], |f, b, share| pieces.push((f, b, share)));
+                let points: Vec<[f64; 4]> =
+                    lengths.iter().map(|&l| normalised(exact, front, back, &pieces, l, lengths[1])).collect();
+                let coefficient = |i: usize| {
+                    let [r, g, b] =
+                        [0, 1, 2].map(|k| points.iter().zip(&inverse[i]).map(|(p, w)| p[k] * w).sum::<f64>() as f32);
+                    [r, g, b, if i == 0 { points[0][3] as f32 } else { 0.0 }]
+                };
+                (0..points.len()).map(coefficient).collect()
+            })
+            .collect();
+        let texels = (0..=degree as usize).map(|i| columns.iter().map(|c| c[i]).collect()).collect();
+        Some(Polynomial { degree, size, longest, direct: exact.direct, texels })
+    }
+
+    /// Premultiplied colour and opacity of a segment, as a linear filter of the texels finds them.
+    pub fn look_up(&self, front: f64, back: f64, l: f64) -> [f64; 4] {
+        let [f, b] = [front, back].map(|s| between((s + 1.0) / 2.0, self.size));
+        let mut sums = vec![[0.0; 4]; self.texels.len()];
+        for ((i, u), (j, v)) in b.into_iter().flat_map(|(j, v)| f.map(|i| (i, (j, v)))) {
+            for (sum, texels) in sums.iter_mut().zip(&self.texels) {
+                let texel = texels[j * self.size as usize + i];
+                *sum = std::array::from_fn(|k| sum[k] + u * v * f64::from(texel[k]));
+            }
+        }
+        let x = l / self.longest;
+        let color = [0, 1, 2].map(|k| sums.iter().rev().fold(0.0, |c, s| c * x + s[k]));
+        reconstructed(color, sums[0][3], l, self.direct)
+    }
+
+    /// Bytes of its texels as 32-bit floats.
+    pub fn bytes(&self) -> u64 {
+        16 * u64::from(self.size).pow(2) * u64::from(self.degree + 1)
+    }
+}
+
+/// Lagrange's polynomials, multiplied out.
+fn inverse(degree: usize) -> Inverse {
+    let at = |i: usize| i as f64 / degree as f64;
+    let mut rows = vec![vec![0.0; degree + 1]; degree + 1];
+    for j in 0..=degree {
+        // The polynomial that is 1 at j and 0 at the other points.
+        let mut powers = vec![1.0];
+        for i in (0..=degree).filter(|&i| i != j) {
+            let mut next = vec![0.0; powers.len() + 1];
+            for (k, p) in powers.iter().enumerate() {
+                next[k + 1] += p / (at(j) - at(i));
+                next[k] -= p * at(i) / (at(j) - at(i));
+            }
+            powers = next;
+        }
+        powers.into_iter().enumerate().for_each(|(k, p)| rows[k][j] = p);
+    }
+    rows
+}

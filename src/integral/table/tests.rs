@@ -1,0 +1,170 @@
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use super::cylindrical::{coordinates, place};
+use super::*;
+use crate::field::Normal;
+use crate::transfer::{Emission, TransferFunction};
+
+fn exact(opacity: &[(f64, f64)], emission: Emission) -> Exact<f64> {
+    let color = vec![(-1.0, [1.0, 0.2, 0.0]), (0.3, [0.0, 0.5, 0.9]), (1.0, [0.4, 0.4, 0.4])];
+    let transfer = TransferFunction::new(color, opacity.to_vec(), 1.0).unwrap().with_emission(emission).unwrap();
+    Exact::new(&transfer, field::Kind::Scalar, &[Normal { mid: 0.0, half: 1.0 }; 4], 1.0)
+}
+
+#[test]
+fn slices_are_where_equation_1_puts_them() {
+    for kind in [Kind::Log, Kind::LogNormalised, Kind::Uniform] {
+        for n in [4, 16] {
+            for k in 0..n {
+                let at = coordinate(kind, n, 3.0, length(kind, n, 3.0, k)) * f64::from(n) - 0.5;
+                assert!((at - f64::from(k)).abs() < 1e-12, "{kind:?}: slice {k} of {n} is at {at}");
+            }
+        }
+    }
+    // Linear up to Δl: figure 6.
+    let [half, one] = [0.5, 1.0].map(|x| coordinate(Kind::Log, 8, 64.0, x) * 8.0 - 0.5);
+    assert!((half - 0.5).abs() < 1e-12 && (one - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn texels_hold_the_exact_integral() {
+    let ramp = [(-1.0, 0.0), (0.0, 0.0), (0.2, 3.0), (1.0, 0.5)];
+    for emission in [Emission::Chromatic, Emission::Direct { scale: 0.7 }] {
+        let exact = exact(&ramp, emission);
+        for kind in [Kind::Log, Kind::LogNormalised, Kind::Uniform] {
+            let table = Table::new(&exact, kind, [17, 17, 9], 2.0).unwrap();
+            for (front, back, k) in [(0, 16, 8), (3, 12, 5), (12, 3, 8), (9, 9, 2), (16, 15, 1), (2, 3, 4), (4, 4, 0)] {
+                let value = |i: u32| -1.0 + f64::from(i) / 8.0;
+                let l = length(kind, 9, 2.0, k);
+                let (got, want) =
+                    (table.look_up(value(front), value(back), l), published(&exact, value(front), value(back), l));
+                for c in 0..4 {
+                    assert!((got[c] - want[c]).abs() < 1e-6, "{kind:?} {front} {back} {k}: {got:?}, not {want:?}");
+                }
+            }
+        }
+    }
+    assert_eq!(Table::new(&exact(&ramp, Emission::Chromatic), Kind::Log, [1, 2, 9], 1.0), None);
+}
+
+/// The bias of the published table, and that it is none of the normalised one.
+#[test]
+fn logarithmic_lengths_are_biased_unless_normalised() {
+    let exact = exact(&[(-1.0, 0.02), (1.0, 0.02)], Emission::Chromatic);
+    for n in [8, 16, 64] {
+        let bias = |kind: Kind| {
+            let table = Table::new(&exact, kind, [2, 2, n], 0.25).unwrap();
+            let (mut sum, mut most) = (0.0, 0.0f64);
+            for i in 0..1000 {
+                // Thin: three slices below the last half.
+                let l =
+                    0.25 * (-4.0 + 3.0 * (f64::from(i) + 0.5) / 1000.0).exp2() / 16.0 * if n == 8 { 8.0 } else { 1.0 };
+                let over = table.look_up(-1.0, 1.0, l)[3] / published(&exact, -1.0, 1.0, l)[3] - 1.0;
+                sum += over / 1000.0;
+                most = most.max(over.abs());
+            }
+            (sum, most)
+        };
+        let (mean, most) = bias(Kind::Log);
+        assert!((mean - 0.0407).abs() < 2e-3 && (most - 0.0615).abs() < 2e-3, "{n}: {mean}, {most}");
+        let (_, most) = bias(Kind::LogNormalised);
+        assert!(most < 1e-6, "{n}: {most}");
+    }
+}
+
+/// 20,000 segments anywhere.
+fn segments() -> impl Iterator<Item = [f64; 3]> {
+    let mut seed = 9u64;
+    let mut unit = move || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 11) as f64 / (1u64 << 53) as f64
+    };
+    (0..20_000).map(move |_| [2.0 * unit() - 1.0, 2.0 * unit() - 1.0, unit()])
+}
+
+/// The root mean square and the greatest of the errors of all channels, for lengths up to `longest`.
+fn errors(exact: &Exact<f64>, longest: f64, look_up: impl Fn(f64, f64, f64) -> [f64; 4]) -> [f64; 2] {
+    let (mut sum, mut most, mut count) = (0.0, 0.0f64, 0.0);
+    for [front, back, l] in segments() {
+        let (got, want) = (look_up(front, back, l * longest), published(exact, front, back, l * longest));
+        for k in 0..4 {
+            let e = (got[k] - want[k]).abs();
+            assert!(e.is_finite(), "{front} {back} {l}");
+            (sum, most, count) = (sum + e * e, most.max(e), count + 1.0);
+        }
+    }
+    [f64::sqrt(sum / count), most]
+}
+
+#[test]
+fn cylinder_coordinates_lead_there_and_back() {
+    for [front, back, l] in segments().map(|[f, b, l]| [(f + 1.0) / 2.0, (b + 1.0) / 2.0, l]) {
+        let [a, s, t] = coordinates(front, back, l);
+        assert!([a, s, t].iter().all(|x| (0.0..=1.0).contains(x)), "{a} {s} {t}");
+        let [f, b, m] = place(a, s, t);
+        assert!((f - front).abs() < 1e-14 && b == back && (m - l).abs() < 1e-14, "{front} {back} {l}: {f} {b} {m}");
+    }
+    assert_eq!(coordinates(0.3, 0.3, 0.0), [0.0, 0.0, 0.3]);
+    // The borders of the four parts, from both sides.
+    for (a, s, t) in [(0.25, 0.5, 0.25), (0.5, 0.5, 0.25), (0.75, 0.25, 0.5)] {
+        let (below, above) = (place(a - 1e-12, s, t), place(a + 1e-12, s, t));
+        assert!((0..3).all(|k| (below[k] - above[k]).abs() < 1e-11), "{a}");
+    }
+}
+
+/// What the cylinder's planes cost in accuracy beside a table of three parameters, and what more of them gain.
+#[test]
+fn planes_stand_for_a_volume() {
+    let smooth = exact(&[(-1.0, 0.0), (0.0, 1.5), (1.0, 0.2)], Emission::Chromatic);
+    let mut last = f64::INFINITY;
+    for n in [16, 32, 64] {
+        let volume = Table::new(&smooth, Kind::Uniform, [n; 3], 2.0).unwrap();
+        let planes = Cylindrical::new(&smooth, 4 * n, n, 2.0).unwrap();
+        let [of_volume, _] = errors(&smooth, 2.0, |f, b, l| volume.look_up(f, b, l));
+        let [of_planes, _] = errors(&smooth, 2.0, |f, b, l| planes.look_up(f, b, l));
+        assert!(of_planes <= 2.0 * of_volume, "{n}: {of_planes}, {of_volume}");
+        assert!(of_planes < 0.6 * last, "{n}: {of_planes} after {last}");
+        last = of_planes;
+    }
+    let flat = Cylindrical::new(&smooth, 64, 16, 2.0).unwrap();
+    assert_eq!(flat.look_up(0.4, 0.4, 0.0), [0.0; 4]);
+}
+
+#[test]
+fn polynomials_of_higher_degree_are_better() {
+    let bands: Vec<(f64, f64)> =
+        (0..8).map(|i| (-1.0 + 2.0 * f64::from(i) / 7.0, if i % 2 == 0 { 0.2 } else { 6.0 })).collect();
+    for emission in [Emission::Chromatic, Emission::Direct { scale: 0.7 }] {
+        let bands = exact(&bands, emission);
+        let rms = [1, 2, 4].map(|degree| {
+            let table = Polynomial::new(&bands, degree, 128, 1.0).unwrap();
+            errors(&bands, 1.0, |f, b, l| table.look_up(f, b, l))[0]
+        });
+        assert!(rms[1] < 0.7 * rms[0] && rms[2] < 0.7 * rms[1], "{rms:?}");
+        // Opacity needs no polynomial: at texels it is exact but for rounding.
+        let table = Polynomial::new(&bands, 1, 15, 1.0).unwrap();
+        for (front, back, l) in [(0, 14, 0.7), (3, 9, 0.2), (14, 2, 1.0), (5, 5, 0.4)] {
+            let [front, back] = [front, back].map(|i| value(i, 15));
+            let (got, want) = (table.look_up(front, back, l)[3], published(&bands, front, back, l)[3]);
+            assert!((got - want).abs() < 1e-6, "{front} {back} {l}: {got}, not {want}");
+        }
+    }
+}
+
+#[test]
+fn limits_are_finite() {
+    let peak = exact(&[(-1.0, 0.0), (0.0, 0.0), (0.01, 50.0), (0.02, 0.0), (1.0, 0.0)], Emission::Chromatic);
+    let polynomial = Polynomial::new(&peak, 4, 33, 1.0).unwrap();
+    let planes = Cylindrical::new(&peak, 32, 16, 1.0).unwrap();
+    let volume = Table::new(&peak, Kind::LogNormalised, [33, 33, 8], 1.0).unwrap();
+    for [front, back, l] in
+        [[-1.0, -1.0, 0.0], [0.0, 0.0, 1.0], [0.5, 0.5, 1e-300], [0.01, 0.01, 0.0], [1.0, -1.0, 0.0]]
+    {
+        for got in [polynomial.look_up(front, back, l), planes.look_up(front, back, l), volume.look_up(front, back, l)]
+        {
+            assert!(got.iter().all(|c| c.is_finite()), "{front} {back} {l}: {got:?}");
+        }
+    }
+    assert_eq!(Polynomial::new(&peak, 0, 33, 1.0), None);
+    assert_eq!(Cylindrical::new(&peak, 1, 33, 1.0), None);
+}
