@@ -96,7 +96,7 @@ def test_multi_block_mapper():
     v = volume(lattice(), WAVES, RAMP)
     v.SetMapper(m)
     w, r = scene(v, position=(5, -4, 6), focus=(0.5, 0.5, 1), clip=(1, 20))
-    check(pixels(w), truth(r, (64, 64), high=(1, 1, 2), field=lambda p: p[..., 2] / 2, opacity=WAVES, color=RAMP), near=2.5)
+    check(pixels(w), truth(r, (64, 64), high=(1, 1, 2), field=lambda p: p[..., 2] / 2, opacity=WAVES, color=RAMP))
 
 
 def python(code, **environment):
