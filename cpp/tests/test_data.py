@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """Arrays of every layout, scalar modes, functions."""
+import os
+
 import numpy as np
 from scene import *  # noqa: F403
 from test_pictures import RAMP, SLANT, TENT, WAVES
@@ -250,6 +252,42 @@ def test_errors_leave_the_application_alive():
         for setting in ("Device", "Engine", "Integral"):
             getattr(v.GetMapper(), "Set" + setting)("auto")
         check(pixels(w), truth(r, (64, 64), **BOX), what=name)
+
+
+def test_projection_engine():
+    """Bricks of a lattice can be sorted by depth."""
+    for camera, unit in (dict(), 1.0), (dict(parallel=0.9), 0.5):
+        v = volume(lattice(2, cells="hex", field=SLANT), WAVES, RAMP, unit)
+        m = v.GetMapper()
+        m.SetEngine("project")
+        errors = Errors(m)
+        w, r = scene(v, **camera)
+        picture = pixels(w)
+        if len(errors):
+            # There is no Vulkan driver here, not even one in software.
+            assert "HALITE_REQUIRE_GPU" not in os.environ
+            m.SetEngine("auto")
+            assert pixels(w).max() > 0
+            print("skipped: no device can project")
+            return
+        check(picture, truth(r, (64, 64), unit=unit, **BOX), what=m.GetAdapter())
+    stretch = np.diag([1.5, 0.7, 1.2, 1])
+    v.SetUserMatrix(transform(stretch))
+    check(pixels(w), truth(r, (64, 64), unit=unit, matrix=stretch, **BOX), what="moved")
+    assert m.GetNumberOfMeshUploads() == 1 and m.GetNumberOfPointUploads() == 1
+    r.AddActor(plane(0.4))
+    over = truth(r, (64, 64), unit=unit, matrix=stretch, keep=lambda p: p[..., 2] > 0.4, steps=2000, **BOX)
+    check(pixels(w), over + (1 - over[..., 3:] / 255) * [0, 0, 0, 255], what="opaque plane")
+    # What it cannot do is an error, and the next frame is drawn.
+    m.SetBlendModeToMaximumIntensity()
+    pixels(w)
+    assert len(errors) == 1
+    m.SetBlendModeToComposite()
+    m.SetDevice("cpu")
+    pixels(w)
+    assert len(errors) == 2
+    m.SetDevice("auto")
+    check(pixels(w), over + (1 - over[..., 3:] / 255) * [0, 0, 0, 255], what="again")
 
 
 def test_what_is_not_honoured_is_said_once():

@@ -58,7 +58,9 @@ public:
 
   ///@{
   /**
-   * How: "auto" (the default) or "traverse".
+   * How: "auto" (the default) or "traverse", by rays that walk from cell to cell; or "project", which sorts cells by depth and blends
+   * them. That needs a device for graphics, be it in software, so it is an error with Device "cpu"; it refuses maximum intensity;
+   * and its order is right for some meshes only.
    */
   vtkSetStringMacro(Engine);
   vtkGetStringMacro(Engine);
