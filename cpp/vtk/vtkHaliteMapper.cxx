@@ -771,13 +771,14 @@ void vtkHaliteMapper::Render(vtkRenderer* renderer, vtkVolume* volume)
   {
     remark("Halite does not shade: the volume emits light and absorbs it");
   }
-  if (property->HasGradientOpacity(0) && !property->GetDisableGradientOpacity(0))
-  {
-    remark("Halite does not draw gradient opacity");
-  }
+  // With 2D functions, VTK says that there is gradient opacity.
   if (property->GetTransferFunctionMode() == vtkVolumeProperty::TF_2D)
   {
     remark("Halite does not draw 2D transfer functions; the 1D functions are used");
+  }
+  else if (property->HasGradientOpacity(0) && !property->GetDisableGradientOpacity(0))
+  {
+    remark("Halite does not draw gradient opacity");
   }
 
   ForwardLog();
