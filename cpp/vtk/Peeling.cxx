@@ -110,7 +110,7 @@ Peeling::Peeling(vtkOpenGLRenderWindow* window)
 
 Peeling::~Peeling() = default;
 
-vtkOpenGLRenderPass* Peeling::PassOf(vtkVolume* volume)
+vtkOpenGLRenderPass* Peeling::PassOf(vtkAbstractMapper* mapper, vtkVolume* volume)
 {
   vtkInformation* keys = volume->GetPropertyKeys();
   vtkInformationObjectBaseVectorKey* passes = vtkOpenGLRenderPass::RenderPasses();
@@ -118,10 +118,21 @@ vtkOpenGLRenderPass* Peeling::PassOf(vtkVolume* volume)
   {
     if (auto pass = vtkDualDepthPeelingPass::SafeDownCast(passes->Get(keys, i)))
     {
-      return pass;
+      return StageOf(pass, mapper, volume) == Unknown ? nullptr : pass;
     }
   }
   return nullptr;
+}
+
+Peeling::Stage Peeling::StageOf(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolume* volume)
+{
+  std::string vertex, geometry, fragment = "//VTK::DepthPeeling::Dec\n";
+  pass->PreReplaceShaderValues(vertex, geometry, fragment, mapper, volume);
+  const auto declares = [&](const char* name) { return fragment.find(name) != std::string::npos; };
+  return declares("lastFrontColorTex") ? Between
+    : declares("depthRangeTex")        ? Rest
+    : declares("outerDepthTex")        ? Outside
+                                       : Unknown;
 }
 
 vtkOpenGLQuadHelper& Peeling::Ready(std::unique_ptr<vtkOpenGLQuadHelper>& quad, const char* fragment)
@@ -141,20 +152,10 @@ vtkOpenGLQuadHelper& Peeling::Ready(std::unique_ptr<vtkOpenGLQuadHelper>& quad, 
   return *quad;
 }
 
-bool Peeling::Ask(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolume* volume, int width, int height,
+void Peeling::Ask(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolume* volume, int width, int height,
   std::vector<Parts>& parts)
 {
-  std::string vertex, geometry, fragment = "//VTK::DepthPeeling::Dec\n";
-  pass->PreReplaceShaderValues(vertex, geometry, fragment, mapper, volume);
-  const auto declares = [&](const char* name) { return fragment.find(name) != std::string::npos; };
-  this->Now = declares("lastFrontColorTex") ? Between
-    : declares("depthRangeTex")             ? Rest
-    : declares("outerDepthTex")             ? Outside
-                                            : Unknown;
-  if (this->Now == Unknown)
-  {
-    return false;
-  }
+  this->Now = StageOf(pass, mapper, volume);
   vtkOpenGLState* state = this->Window->GetState();
   vtkOpenGLState::ScopedglViewport viewport(state);
   vtkOpenGLState::ScopedglEnableDisable scissorTest(state, ScissorTest);
@@ -175,11 +176,11 @@ bool Peeling::Ask(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolum
   {
     throw std::runtime_error("the window refuses a texture of 32-bit floats");
   }
+  vtkOpenGLQuadHelper& quad = this->Ready(this->Questions[this->Now], ::Questions[this->Now]);
   state->PushFramebufferBindings();
   buffer->Bind();
   buffer->AddColorAttachment(0, depths);
   buffer->ActivateDrawBuffer(0);
-  vtkOpenGLQuadHelper& quad = this->Ready(this->Questions[this->Now], ::Questions[this->Now]);
   pass->SetShaderParameters(quad.Program, mapper, volume);
   quad.Render();
   buffer->RemoveColorAttachment(0);
@@ -196,7 +197,6 @@ bool Peeling::Ask(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolum
   {
     throw std::runtime_error("the depths of translucent surfaces cannot be read");
   }
-  return true;
 }
 
 void Peeling::Answer(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolume* volume,

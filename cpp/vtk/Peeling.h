@@ -35,11 +35,11 @@ public:
   explicit Peeling(vtkOpenGLRenderWindow* window);
   ~Peeling();
 
-  // The pass that draws a volume in peels just now; null if none does.
-  static vtkOpenGLRenderPass* PassOf(vtkVolume* volume);
+  // The pass that draws a volume in peels just now; null if none does, or in a way that is not known.
+  static vtkOpenGLRenderPass* PassOf(vtkAbstractMapper* mapper, vtkVolume* volume);
 
-  // What the pass wants of each pixel, row 0 lowest. False if it is in no stage that is known.
-  bool Ask(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolume* volume, int width, int height,
+  // What the pass wants of each pixel, row 0 lowest.
+  void Ask(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolume* volume, int width, int height,
     std::vector<Parts>& parts);
 
   // Whether what was asked for last lies before and behind all layers; it starts a frame.
@@ -58,6 +58,7 @@ private:
     Rest,
     Unknown
   };
+  static Stage StageOf(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolume* volume);
   vtkOpenGLQuadHelper& Ready(std::unique_ptr<vtkOpenGLQuadHelper>& quad, const char* fragment);
 
   vtkWeakPointer<vtkOpenGLRenderWindow> Window;

@@ -171,9 +171,10 @@ struct Knots
   Functions::Opacity Opacity;
 };
 
-// Premultiplied pixels of rays that end at these depths; 0 where there is none.
+// Premultiplied pixels of rays that end at these depths. Of each pixel of the window, which of these is its own; -1 is none.
 struct Layer
 {
+  std::vector<int> Places;
   std::vector<float> Depths, Pixels;
   bool Used;
 };
@@ -594,10 +595,11 @@ const float* Find(std::list<Layer>& layers, std::size_t pixel, float depth)
   }
   for (Layer& layer : layers)
   {
-    if (layer.Depths[pixel] == depth)
+    const int place = layer.Places[pixel];
+    if (place >= 0 && layer.Depths[place] == depth)
     {
       layer.Used = true;
-      return &layer.Pixels[4 * pixel];
+      return &layer.Pixels[4 * static_cast<std::size_t>(place)];
     }
   }
   return nullptr;
@@ -624,10 +626,7 @@ bool vtkHaliteMapper::Internals::Peel(vtkHaliteMapper& self, const Content& cont
   std::vector<Parts> parts;
   {
     Clock clock(self.DepthTime);
-    if (!presenter.GetPeeling().Ask(pass, &self, volume, width, height, parts))
-    {
-      return false;
-    }
+    presenter.GetPeeling().Ask(pass, &self, volume, width, height, parts);
   }
   const bool isOutside = presenter.GetPeeling().IsOutside();
   if (isOutside)
@@ -657,11 +656,20 @@ bool vtkHaliteMapper::Internals::Peel(vtkHaliteMapper& self, const Content& cont
       }
       if (any)
       {
-        Layer layer{ std::move(ends), {}, true };
-        view.depths = layer.Depths.data();
-        if (!this->Draw(self, content, view, presenter.GetWindow(), layer.Pixels))
+        view.depths = ends.data();
+        if (!this->Draw(self, content, view, presenter.GetWindow(), this->Pixels))
         {
           return false;
+        }
+        Layer layer{ std::vector<int>(ends.size(), -1), {}, {}, true };
+        for (std::size_t i = 0; i < ends.size(); ++i)
+        {
+          if (ends[i] > 0)
+          {
+            layer.Places[i] = static_cast<int>(layer.Depths.size());
+            layer.Depths.push_back(ends[i]);
+            layer.Pixels.insert(layer.Pixels.end(), &this->Pixels[4 * i], &this->Pixels[4 * i] + 4);
+          }
         }
         frame.Layers.push_back(std::move(layer));
       }
@@ -733,7 +741,7 @@ void vtkHaliteMapper::Render(vtkRenderer* renderer, vtkVolume* volume)
   const bool maximum = this->GetBlendMode() == vtkUnstructuredGridVolumeMapper::MAXIMUM_INTENSITY_BLEND;
   const bool peels = !inner.DrawsLate && keys && keys->Has(vtkOpenGLActor::GLDepthMaskOverride()) &&
     keys->Get(vtkOpenGLActor::GLDepthMaskOverride()) < 0;
-  vtkOpenGLRenderPass* pass = peels && !maximum ? Peeling::PassOf(volume) : nullptr;
+  vtkOpenGLRenderPass* pass = peels && !maximum ? Peeling::PassOf(this, volume) : nullptr;
   if (peels && !pass)
   {
     remark("Halite draws this volume over translucent geometry, not between its layers");
