@@ -72,7 +72,7 @@ def compare(n):
                 parts.append((mapper.GetPrepareTime(), mapper.GetDepthTime(), mapper.GetCoreTime(), mapper.GetPresentTime()))
     medians = {name: statistics.median(t) for name, t in times.items()}
     for name, t in medians.items():
-        print(f"  {name}: {t:.1f} ms ({min(t):.1f} to {max(t):.1f})")
+        print(f"  {name}: {t:.1f} ms ({min(times[name]):.1f} to {max(times[name]):.1f})")
     prepare, depth, core, present = (1e3 * statistics.median(p) for p in zip(*parts))
     print(f"  core {core:.1f} ms; host side: prepare {prepare:.2f}, depth read {depth:.2f}, upload and blit {present:.2f} ms")
     print(f"  ratio {medians['projected tetrahedra'] / medians['Halite']:.1f}; still frame {frame(windows['Halite'][0]):.2f} ms")
