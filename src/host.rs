@@ -7,7 +7,7 @@ use crate::gpu::DeviceChoice;
 use crate::image::Image;
 use crate::mesh::Mesh;
 use crate::mesh::cells::{self, Tetrahedra};
-use crate::render::{Renderer, Stats};
+use crate::render::{Engine, Renderer, Stats};
 use crate::transfer::TransferFunction;
 use crate::view::View;
 use glam::{DMat4, DVec3};
@@ -24,7 +24,7 @@ use std::time::Duration;
 const TELL: Duration = Duration::from_millis(20);
 
 /// Names of the engines that a session may be asked for; the first two are the same.
-pub const ENGINES: [&str; 2] = ["auto", "traverse"];
+pub const ENGINES: [&str; 3] = ["auto", "traverse", "project"];
 
 /// Names of the forms of the ray integral that a session may be asked for.
 pub const INTEGRALS: [&str; 2] = ["auto", "exact"];
@@ -64,16 +64,17 @@ impl Session {
     /// A session with `threads` threads of its own (0: one for each core), on a device as [`DeviceChoice::parse`] reads it.
     ///
     /// # Errors
-    /// Those of [`Renderer::with_device`]; [`Error::Render`] if `engine` is none of [`ENGINES`], or `integral` none of
+    /// Those of [`Renderer::with_engine`]; [`Error::Render`] if `engine` is none of [`ENGINES`], or `integral` none of
     /// [`INTEGRALS`].
     pub fn new(threads: usize, device: &str, engine: &str, integral: &str) -> Result<Self> {
-        for (what, name, known) in [("engine", engine, ENGINES), ("integral", integral, INTEGRALS)] {
+        for (what, name, known) in [("engine", engine, &ENGINES[..]), ("integral", integral, &INTEGRALS[..])] {
             if !name.is_empty() && !known.contains(&name.to_ascii_lowercase().as_str()) {
                 let known = known.join("\", \"");
                 return Err(Error::Render(format!("no {what} is called \"{name}\"; there are \"{known}\"")));
             }
         }
-        let renderer = Renderer::with_device(threads, DeviceChoice::parse(device))?;
+        let engine = if engine.eq_ignore_ascii_case("project") { Engine::Project } else { Engine::Auto };
+        let renderer = Renderer::with_engine(threads, DeviceChoice::parse(device), engine)?;
         Ok(Session { renderer, state: State::NoMesh, mirrored: false, failed: false })
     }
 
@@ -413,7 +414,9 @@ mod tests {
     #[test]
     fn unknown_names_are_refused_with_those_that_exist() {
         let message = Session::new(1, "cpu", "magic", "exact").unwrap_err().to_string();
-        assert!(message.contains("magic") && message.contains("traverse"), "{message}");
+        assert!(message.contains("magic") && message.contains("traverse") && message.contains("project"), "{message}");
+        let message = Session::new(1, "cpu", "project", "exact").unwrap_err().to_string();
+        assert!(message.contains("graphics device") && message.contains("traverse"), "{message}");
         assert!(Session::new(1, "cpu", "traverse", "guess").unwrap_err().to_string().contains("exact"));
     }
 }

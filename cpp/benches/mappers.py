@@ -5,6 +5,7 @@
 
 31 points along each axis make 162,000 tetrahedra, 61 make 1,296,000. Build with cargo's profile "release" first.
 """
+import os
 import pathlib
 import statistics
 import sys
@@ -54,7 +55,7 @@ def compare(n):
     opacity = [(-1.5, 0.3), (-0.8, 0), (-0.2, 0), (0, 0.6), (0.2, 0), (1.5, 0.4)]
     color = [(-1.5, 0.1, 0.2, 0.9), (0, 0.9, 0.9, 0.3), (1.5, 0.9, 0.1, 0.1)]
     windows, times, parts = {}, {}, []
-    print(f"{grid.GetNumberOfCells()} tetrahedra")
+    print(f"{grid.GetNumberOfCells()} tetrahedra; {os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}")
     for name, mapper in (("Halite", vtkHaliteMapper()), ("projected tetrahedra", vtkOpenGLProjectedTetrahedraMapper())):
         w = window((512, 512))
         w.SetOffScreenRendering(1)
@@ -71,7 +72,7 @@ def compare(n):
                 parts.append((mapper.GetPrepareTime(), mapper.GetDepthTime(), mapper.GetCoreTime(), mapper.GetPresentTime()))
     medians = {name: statistics.median(t) for name, t in times.items()}
     for name, t in medians.items():
-        print(f"  {name}: {t:.1f} ms")
+        print(f"  {name}: {t:.1f} ms ({min(times[name]):.1f} to {max(times[name]):.1f})")
     prepare, depth, core, present = (1e3 * statistics.median(p) for p in zip(*parts))
     print(f"  core {core:.1f} ms; host side: prepare {prepare:.2f}, depth read {depth:.2f}, upload and blit {present:.2f} ms")
     print(f"  ratio {medians['projected tetrahedra'] / medians['Halite']:.1f}; still frame {frame(windows['Halite'][0]):.2f} ms")

@@ -288,7 +288,8 @@ struct Settings
   std::size_t threads = 0;
   /// "auto", "cpu", or a GPU by index, UUID or part of its name.
   std::string device;
-  /// "auto" or "traverse".
+  /// "auto" or "traverse": rays walk from cell to cell. "project": cells are sorted by depth and blended; it needs a device for
+  /// graphics (not "cpu"), refuses the maximum, and its order is right for some meshes only.
   std::string engine;
   /// "auto" or "exact".
   std::string integral;

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """Arrays of every layout, scalar modes, functions."""
+import os
+
 import numpy as np
 from scene import *  # noqa: F403
 from test_pictures import RAMP, SLANT, TENT, WAVES
@@ -115,11 +117,12 @@ def test_dependent_components():
     v.GetProperty().IndependentComponentsOff()
     w, r = scene(v)
     picture = pixels(w)
-    # The truth has one field for both, so opacity is checked by the alpha, and colour where it is one.
-    check(picture[..., 3:], truth(r, (64, 64), **BOX)[..., 3:], what="opacity")
-    v.GetProperty().SetColor(colors([(0, 1, 0, 0), (0.4999, 1, 0, 0), (0.5001, 0, 0, 1), (1, 0, 0, 1)]))
+    hue = lambda p: p[..., 0]
+    check(picture, truth(r, (64, 64), hue=hue, **BOX), what="smooth")
+    steps = [(0, 1, 0, 0), (0.4999, 1, 0, 0), (0.5001, 0, 0, 1), (1, 0, 0, 1)]
+    v.GetProperty().SetColor(colors(steps))
     picture = pixels(w)
-    check(picture[..., 0] + picture[..., 2], picture[..., 3], near=2, what="colour")
+    check(picture, truth(r, (64, 64), hue=hue, **{**BOX, "color": steps}), what="steps")
     assert picture[..., 0].max() > 100 and picture[..., 2].max() > 100
 
 
@@ -159,16 +162,40 @@ def test_grey_functions():
     expect(v, color=[(0, 0.1, 0.1, 0.1), (0.6, 1, 1, 1), (1, 0.3, 0.3, 0.3)])
 
 
+NODES = [(0, 0.1, 0.2, 0.9), (0.4, 0.9, 0.8, 0.2), (1, 0.8, 0.0, 0.1)]
+
+
+def as_told(f, n=4001, low=0.0):
+    """What VTK itself says of a function, at so many places: the truth."""
+    at = np.linspace(low, 1, n)
+    if isinstance(f, vtkCommonDataModel.vtkPiecewiseFunction):
+        return [(s, f.GetValue(s)) for s in at]
+    values = [0.0] * (3 * n)
+    f.GetTable(low, 1.0, n, values)
+    return np.column_stack([at, np.reshape(values, (n, 3))])
+
+
 def test_colour_spaces():
-    # What VTK says of each colour function at many places is the truth.
-    for space in ("RGB", "HSV", "HSVNoWrap", "Lab", "Diverging", "Step"):
-        try:
-            f = colors([(0, 0.1, 0.2, 0.9), (0.4, 0.9, 0.8, 0.2), (1, 0.8, 0.0, 0.1)], space)
-        except AttributeError:
-            continue
-        at = np.linspace(0, 1, 4001)
-        table = [(s, *f.GetColor(s)) for s in at]
+    seen = {}
+    for space in ("RGB", "HSV", "HSV without wrapping", "Lab", "LabCIEDE2000", "Diverging", "Step"):
+        f = colors(NODES, space.split()[0])
+        f.SetHSVWrap(" " not in space)
+        table = as_told(f)
+        seen[space] = np.array(table)
         expect(volume(lattice(2, field=SLANT), TENT, f), space, opacity=TENT, color=table)
+    apart = [(a, b) for a in seen for b in seen if a < b and np.abs(seen[a] - seen[b]).max() < 0.01]
+    assert len(apart) <= 1, apart
+
+
+def test_logarithmic_colours():
+    for space in ("RGB", "LabCIEDE2000"):
+        f = colors([(0.01, 0.1, 0.2, 0.9), (0.1, 0.9, 0.8, 0.2), (1, 0.8, 0.0, 0.1)], space)
+        f.SetScaleToLog10()
+        table = as_told(f, 2001, low=0.01)
+        # VTK's tables of such functions are equally spaced in the logarithm.
+        table[:, 0] = np.geomspace(0.01, 1, 2001)
+        far = lambda p: 0.01 + 0.9 * SLANT(p)
+        expect(volume(lattice(2, field=far), TENT, f), space, field=far, opacity=TENT, color=table)
 
 
 def test_midpoints_and_sharpness():
@@ -176,15 +203,28 @@ def test_midpoints_and_sharpness():
     f.AddPoint(0, 0, 0.3, 0.6)
     f.AddPoint(0.5, 3, 0.7, 1.0)
     f.AddPoint(1, 0.2, 0.5, 0)
-    at = np.linspace(0, 1, 8001)
-    expect(volume(lattice(2, field=SLANT), f, RAMP), opacity=[(s, f.GetValue(s)) for s in at])
+    expect(volume(lattice(2, field=SLANT), f, RAMP), opacity=as_told(f, 8001))
+    c = vtkRenderingCore.vtkColorTransferFunction()
+    c.AddRGBPoint(0, 0.9, 0.1, 0.2, 0.3, 0.6)
+    c.AddRGBPoint(0.5, 0.1, 0.9, 0.3, 0.7, 1.0)
+    c.AddRGBPoint(1, 0.2, 0.3, 1.0)
+    expect(volume(lattice(2, field=SLANT), TENT, c), opacity=TENT, color=as_told(c, 8001))
+
+
+def test_functions_with_two_nodes_in_one_place():
+    f = vtkCommonDataModel.vtkPiecewiseFunction()
+    f.AllowDuplicateScalarsOn()
+    for node in ((0, 0.2), (0.4, 0.2), (0.4, 4), (0.7, 3), (0.7, 0), (1, 0)):
+        f.AddPoint(*node)
+    steps = [(0, 0.2), (0.4, 0.2), (0.4 + 1e-12, 4), (0.7, 3), (0.7 + 1e-12, 0), (1, 0)]
+    expect(volume(lattice(2, field=SLANT), f, RAMP), opacity=steps)
 
 
 def test_functions_end_where_they_do_not_clamp():
     f, c = opacities([(0.3, 1), (0.6, 2)]), colors([(0.3, 1, 0, 0), (0.6, 0, 1, 0)])
     f.ClampingOff()
     v = volume(lattice(2, field=SLANT), f, c)
-    expect(v, opacity=[(0.2999, 0), (0.3, 1), (0.6, 2), (0.6001, 0)], color=[(0.3, 1, 0, 0), (0.6, 0, 1, 0)], near=2)
+    expect(v, opacity=[(0.2999, 0), (0.3, 1), (0.6, 2), (0.6001, 0)], color=[(0.3, 1, 0, 0), (0.6, 0, 1, 0)])
 
 
 def test_unit_distance_and_convention():
@@ -251,15 +291,110 @@ def test_errors_leave_the_application_alive():
         check(pixels(w), truth(r, (64, 64), **BOX), what=name)
 
 
+def test_projection_engine():
+    """Bricks of a lattice can be sorted by depth."""
+    for camera, unit in (dict(), 1.0), (dict(parallel=0.9), 0.5):
+        v = volume(lattice(2, cells="hex", field=SLANT), WAVES, RAMP, unit)
+        m = v.GetMapper()
+        m.SetEngine("project")
+        errors = Errors(m)
+        w, r = scene(v, **camera)
+        picture = pixels(w)
+        if len(errors):
+            # There is no Vulkan driver here, not even one in software.
+            assert "HALITE_REQUIRE_GPU" not in os.environ
+            m.SetEngine("auto")
+            assert pixels(w).max() > 0
+            print("skipped: no device can project")
+            return
+        check(picture, truth(r, (64, 64), unit=unit, **BOX), what=m.GetAdapter())
+    stretch = np.diag([1.5, 0.7, 1.2, 1])
+    v.SetUserMatrix(transform(stretch))
+    check(pixels(w), truth(r, (64, 64), unit=unit, matrix=stretch, **BOX), what="moved")
+    assert m.GetNumberOfMeshUploads() == 1 and m.GetNumberOfPointUploads() == 1
+    r.AddActor(plane(0.4))
+    over = truth(r, (64, 64), unit=unit, matrix=stretch, keep=lambda p: p[..., 2] > 0.4, steps=2000, **BOX)
+    check(pixels(w), over + (1 - over[..., 3:] / 255) * [0, 0, 0, 255], what="opaque plane")
+    # What it cannot do is an error, and the next frame is drawn.
+    m.SetBlendModeToMaximumIntensity()
+    pixels(w)
+    assert len(errors) == 1
+    m.SetBlendModeToComposite()
+    m.SetDevice("cpu")
+    pixels(w)
+    assert len(errors) == 2
+    m.SetDevice("auto")
+    check(pixels(w), over + (1 - over[..., 3:] / 255) * [0, 0, 0, 255], what="again")
+
+
 def test_what_is_not_honoured_is_said_once():
+    steep = opacities([(0, 0), (1, 1)])
+    cases = dict(shade=lambda p: p.ShadeOn(), gradient=lambda p: p.SetGradientOpacity(steep),
+                 functions=lambda p: p.SetTransferFunctionMode(p.TF_2D))
+    for name, ask in cases.items():
+        v = volume(lattice(2, field=SLANT), WAVES, RAMP)
+        ask(v.GetProperty())
+        errors = Errors(v.GetMapper())
+        w, r = scene(v)
+        for k in range(3):
+            r.GetActiveCamera().Azimuth(1)
+            check(pixels(w), truth(r, (64, 64), **BOX), what=name)
+        assert len(errors) == 1, name
+
+
+def test_settings_without_a_meaning_here_change_nothing():
     v = volume(lattice(2, field=SLANT), WAVES, RAMP)
-    v.GetProperty().ShadeOn()
+    p = v.GetProperty()
     errors = Errors(v.GetMapper())
     w, r = scene(v)
-    for k in range(3):
-        r.GetActiveCamera().Azimuth(1)
-        w.Render()
-    assert len(errors) == 1
+    before = pixels(w)
+    p.SetInterpolationTypeToLinear()
+    check(pixels(w), before, near=0, what="linear")
+    p.SetInterpolationTypeToNearest()
+    check(pixels(w), before, near=0, what="nearest")
+    p.SetComponentWeight(0, 0.3)
+    p.SetAmbient(0.7)
+    p.SetScalarOpacity(1, opacities([(0, 9)]))
+    check(pixels(w), before, near=0, what="weights, light and other components")
+    # An array of one component has no others, and its magnitude is not asked for.
+    p.GetRGBTransferFunction(0).SetVectorModeToComponent()
+    p.GetRGBTransferFunction(0).SetVectorComponent(2)
+    check(pixels(w), before, near=0, what="component")
+    p.GetRGBTransferFunction(0).SetVectorModeToMagnitude()
+    check(pixels(w), before, near=0, what="magnitude")
+    p.IndependentComponentsOff()
+    check(pixels(w), before, near=0, what="dependent")
+    assert len(errors) == 0
+
+
+def test_other_arrays():
+    """Bits, ids, and several components one after another: copied where they must be."""
+    from vtkmodules.vtkCommonCore import vtkBitArray, vtkIdTypeArray, vtkSOADataArrayTemplate
+    points = np.array([lattice(2).GetPoint(i) for i in range(27)])
+    # Half of the box holds zeros: what is between 0 and 1 is in the other half.
+    last = lambda p: np.maximum(2 * p[..., 0] - 1, 0)
+    for kind in (vtkBitArray, vtkIdTypeArray):
+        a = kind()
+        for x in points[:, 0]:
+            a.InsertNextTuple1(int(x >= 1))
+        a.SetName("other")
+        g = lattice(2)
+        g.GetPointData().SetScalars(a)
+        expect(volume(g, WAVES, RAMP), kind.__name__, field=last, steps=2000)
+    soa = vtkSOADataArrayTemplate["float32"]()
+    soa.SetNumberOfComponents(2)
+    soa.SetNumberOfTuples(27)
+    soa.SetName("soa")
+    for i, p in enumerate(points):
+        soa.SetTuple2(i, 0.6 * SLANT(p), 0.8 * SLANT(p))
+    g = lattice(2)
+    g.GetPointData().SetScalars(soa)
+    f = colors(RAMP)
+    f.SetVectorModeToMagnitude()
+    expect(volume(g, WAVES, f), "magnitude")
+    v = volume(g, [(0.8 * s, a) for s, a in WAVES], [(0.6 * k[0], *k[1:]) for k in RAMP])
+    v.GetProperty().IndependentComponentsOff()
+    expect(v, "both components")
 
 
 if __name__ == "__main__":

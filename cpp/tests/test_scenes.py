@@ -34,8 +34,9 @@ def draw(path):
     c = s["camera"]
     w, r = scene(v, size=s["size"], position=c["position"], focus=c["focal_point"], up=c["view_up"],
                  angle=c.get("view_angle", 30), parallel=c.get("parallel_scale"))
-    if "clipping_range" in s:
-        r.GetActiveCamera().SetClippingRange(*s["clipping_range"])
+    # VTK's own range would cut off what is just before the camera.
+    far = r.GetActiveCamera().GetClippingRange()[1]
+    r.GetActiveCamera().SetClippingRange(*s.get("clipping_range", (1e-5 * far, far)))
     return pixels(w)
 
 

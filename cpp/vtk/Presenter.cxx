@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 #include "Presenter.h"
 
+#include "Peeling.h"
+
 #include "vtkOpenGLQuadHelper.h"
 #include "vtkOpenGLRenderWindow.h"
 #include "vtkOpenGLShaderCache.h"
@@ -36,6 +38,15 @@ Presenter::~Presenter() = default;
 vtkOpenGLRenderWindow* Presenter::GetWindow() const
 {
   return this->Window;
+}
+
+Peeling& Presenter::GetPeeling()
+{
+  if (!this->Peels)
+  {
+    this->Peels.reset(new Peeling(this->Window));
+  }
+  return *this->Peels;
 }
 
 void Presenter::ReadDepths(

@@ -8,6 +8,7 @@
 #include <memory>
 #include <vector>
 
+class Peeling;
 class vtkOpenGLQuadHelper;
 class vtkOpenGLRenderWindow;
 class vtkRenderer;
@@ -39,7 +40,10 @@ public:
   // Draws a texture over what is in the viewport: colour + (1 - opacity) x what is there, opacity likewise.
   void Present(vtkTextureObject* texture, const Viewport& viewport);
 
+  Peeling& GetPeeling();
+
 private:
   vtkWeakPointer<vtkOpenGLRenderWindow> Window;
+  std::unique_ptr<Peeling> Peels;
   std::unique_ptr<vtkOpenGLQuadHelper> Quad;
 };

@@ -3,6 +3,7 @@
 
 #include "Functions.h"
 #include "MeshView.h"
+#include "Peeling.h"
 #include "Presenter.h"
 #include "vtkHaliteCompatibility.h"
 
@@ -19,6 +20,7 @@
 #include "vtkObjectFactory.h"
 #include "vtkOpenGLActor.h"
 #include "vtkOpenGLCamera.h"
+#include "vtkOpenGLRenderPass.h"
 #include "vtkOpenGLRenderWindow.h"
 #include "vtkPiecewiseFunction.h"
 #include "vtkPlane.h"
@@ -28,6 +30,7 @@
 #include "vtkTextureObject.h"
 #include "vtkUnstructuredGridBase.h"
 #include "vtkVolume.h"
+#include "vtkVolumeCollection.h"
 #include "vtkVolumeProperty.h"
 
 #include <algorithm>
@@ -168,7 +171,15 @@ struct Knots
   Functions::Opacity Opacity;
 };
 
-// A picture that was drawn for a renderer, a volume and an eye.
+// Premultiplied pixels of rays that end at these depths. Of each pixel of the window, which of these is its own; -1 is none.
+struct Layer
+{
+  std::vector<int> Places;
+  std::vector<float> Depths, Pixels;
+  bool Used;
+};
+
+// What was drawn for a renderer, a volume and an eye: a picture, or those of rays up to translucent surfaces.
 struct Frame
 {
   vtkWeakPointer<vtkRenderer> Renderer;
@@ -177,6 +188,9 @@ struct Frame
   Key Pictured;
   std::vector<float> Depths;
   vtkSmartPointer<vtkTextureObject> Texture;
+  std::list<Layer> Layers;
+  // Before the first of these surfaces, and not drawn yet.
+  std::vector<float> Kept;
 };
 
 }
@@ -238,6 +252,14 @@ struct vtkHaliteMapper::Internals
 
   // What is to be drawn now.
   void Choose(vtkHaliteMapper& self, Content& content, vtkVolume* volume);
+
+  // Draws with the core; false if that was given up.
+  bool Draw(vtkHaliteMapper& self, const Content& content, const halite::View& view, vtkWindow* window,
+    std::vector<float>& pixels);
+
+  // Draws what a pass of depth peeling wants now; false if that was given up.
+  bool Peel(vtkHaliteMapper& self, const Content& content, halite::View& view, Presenter& presenter, Frame& frame,
+    vtkOpenGLRenderPass* pass);
 
   // Hands to the core what it does not hold yet.
   void Prepare(vtkHaliteMapper& self, const Content& content);
@@ -540,6 +562,151 @@ void vtkHaliteMapper::Internals::Prepare(vtkHaliteMapper& self, const Content& c
   self.NumberOfCopies += view.GetCopies();
 }
 
+bool vtkHaliteMapper::Internals::Draw(vtkHaliteMapper& self, const Content& content, const halite::View& view,
+  vtkWindow* window, std::vector<float>& pixels)
+{
+  {
+    Clock clock(self.PrepareTime);
+    this->Prepare(self, content);
+  }
+  Clock clock(self.CoreTime);
+  auto opengl = static_cast<vtkOpenGLRenderWindow*>(window);
+  pixels.resize(std::size_t(4) * view.width * view.height);
+  const bool finished = this->Renderer->render(view, pixels.data(), [&](double share) {
+    self.InvokeEvent(vtkCommand::VolumeMapperRenderProgressEvent, &share);
+    return !opengl->CheckAbortStatus();
+  });
+  ++self.NumberOfFrames;
+  // Handlers of events may have drawn elsewhere.
+  opengl->MakeCurrent();
+  return finished;
+}
+
+namespace
+{
+
+// The pixel of the ray up to a depth; null if that was not drawn yet.
+const float* Find(std::list<Layer>& layers, std::size_t pixel, float depth)
+{
+  static const float nothing[4] = { 0, 0, 0, 0 };
+  if (!(depth > 0))
+  {
+    return nothing;
+  }
+  for (Layer& layer : layers)
+  {
+    const int place = layer.Places[pixel];
+    if (place >= 0 && layer.Depths[place] == depth)
+    {
+      layer.Used = true;
+      return &layer.Pixels[4 * static_cast<std::size_t>(place)];
+    }
+  }
+  return nullptr;
+}
+
+// What lies between two ends of a ray, by the pixels up to both.
+void Between(const float* near, const float* far, float* pixel)
+{
+  const double through = 1.0 - near[3];
+  for (int k = 0; k < 4; ++k)
+  {
+    pixel[k] = through > 0 ? static_cast<float>(std::max((double(far[k]) - near[k]) / through, 0.0)) : 0;
+  }
+  pixel[3] = std::min(pixel[3], 1.0f);
+}
+
+}
+
+bool vtkHaliteMapper::Internals::Peel(vtkHaliteMapper& self, const Content& content, halite::View& view,
+  Presenter& presenter, Frame& frame, vtkOpenGLRenderPass* pass)
+{
+  vtkVolume* volume = frame.Volume;
+  const int width = static_cast<int>(view.width), height = static_cast<int>(view.height);
+  std::vector<Parts> parts;
+  {
+    Clock clock(self.DepthTime);
+    presenter.GetPeeling().Ask(pass, &self, volume, width, height, parts);
+  }
+  const bool isOutside = presenter.GetPeeling().IsOutside();
+  if (isOutside)
+  {
+    frame.Kept.clear();
+    frame.Layers.remove_if([](const Layer& layer) { return !layer.Used; });
+    for (Layer& layer : frame.Layers)
+    {
+      layer.Used = false;
+    }
+  }
+  // Four ends of rays for each pixel: the core is asked for what is new of each.
+  for (float Part::*end : { &Part::Start, &Part::End })
+  {
+    for (Part Parts::*part : { &Parts::Front, &Parts::Back })
+    {
+      std::vector<float> ends(parts.size(), 0.0f);
+      bool any = false;
+      for (std::size_t i = 0; i < parts.size(); ++i)
+      {
+        const Part& p = parts[i].*part;
+        if (p.Start < p.End && !Find(frame.Layers, i, p.*end))
+        {
+          ends[i] = p.*end;
+          any = true;
+        }
+      }
+      if (any)
+      {
+        view.depths = ends.data();
+        if (!this->Draw(self, content, view, presenter.GetWindow(), this->Pixels))
+        {
+          return false;
+        }
+        Layer layer{ std::vector<int>(ends.size(), -1), {}, {}, true };
+        for (std::size_t i = 0; i < ends.size(); ++i)
+        {
+          if (ends[i] > 0)
+          {
+            layer.Places[i] = static_cast<int>(layer.Depths.size());
+            layer.Depths.push_back(ends[i]);
+            layer.Pixels.insert(layer.Pixels.end(), &this->Pixels[4 * i], &this->Pixels[4 * i] + 4);
+          }
+        }
+        frame.Layers.push_back(std::move(layer));
+      }
+    }
+  }
+  Clock clock(self.PresentTime);
+  const auto draw = [&](Part Parts::*part) {
+    std::vector<float> pixels(4 * parts.size(), 0.0f);
+    for (std::size_t i = 0; i < parts.size(); ++i)
+    {
+      const Part& p = parts[i].*part;
+      if (p.Start < p.End)
+      {
+        Between(Find(frame.Layers, i, p.Start), Find(frame.Layers, i, p.End), &pixels[4 * i]);
+      }
+    }
+    return pixels;
+  };
+  std::vector<float> kept, front = draw(&Parts::Front), back = draw(&Parts::Back);
+  kept.swap(frame.Kept);
+  // VTK's layers have 8 bits, and what is written less often is rounded less often. Other volumes would have to go between.
+  vtkRenderer* renderer = frame.Renderer;
+  if (isOutside && volume->GetMapper() == &self && renderer->GetVolumes()->GetNumberOfItems() == 1 &&
+    renderer->GetMaximumNumberOfPeels() > 0)
+  {
+    frame.Kept.swap(front);
+  }
+  vtkSmartPointer<vtkTextureObject> textures[3];
+  const std::vector<float>* const pictures[] = { &kept, &front, &back };
+  for (int k = 0; k < 3; ++k)
+  {
+    textures[k] = pictures[k]->empty() ? presenter.Upload(1, 1, { 0, 0, 0, 0 }) : presenter.Upload(width, height, *pictures[k]);
+  }
+  presenter.GetPeeling().Answer(pass, &self, volume, textures[0], textures[1], textures[2]);
+  return true;
+}
+
 void vtkHaliteMapper::Render(vtkRenderer* renderer, vtkVolume* volume)
 {
   Internals& inner = *this->Inner;
@@ -569,12 +736,15 @@ void vtkHaliteMapper::Render(vtkRenderer* renderer, vtkVolume* volume)
   {
     return;
   }
-  // Depth peeling asks for every peel. A picture that is drawn whole goes over the finished scene, once.
+  // Depth peeling asks for parts of rays, in peels. A maximum has no parts, so its picture goes over the finished scene, once.
   vtkInformation* keys = volume->GetPropertyKeys();
-  if (!inner.DrawsLate && keys && keys->Has(vtkOpenGLActor::GLDepthMaskOverride()) &&
-    keys->Get(vtkOpenGLActor::GLDepthMaskOverride()) < 0)
+  const bool maximum = this->GetBlendMode() == vtkUnstructuredGridVolumeMapper::MAXIMUM_INTENSITY_BLEND;
+  const bool peels = !inner.DrawsLate && keys && keys->Has(vtkOpenGLActor::GLDepthMaskOverride()) &&
+    keys->Get(vtkOpenGLActor::GLDepthMaskOverride()) < 0;
+  vtkOpenGLRenderPass* pass = peels && !maximum ? Peeling::PassOf(this, volume) : nullptr;
+  if (peels && !pass)
   {
-    remark("Halite draws this volume over translucent geometry, not between its layers: depth peeling of volumes is on");
+    remark("Halite draws this volume over translucent geometry, not between its layers");
     const bool waits = std::any_of(inner.Lates.begin(), inner.Lates.end(),
       [&](const Internals::Late& l) { return l.Renderer == renderer && l.Volume == volume; });
     if (!waits)
@@ -609,13 +779,14 @@ void vtkHaliteMapper::Render(vtkRenderer* renderer, vtkVolume* volume)
   {
     remark("Halite does not shade: the volume emits light and absorbs it");
   }
-  if (property->HasGradientOpacity(0) && !property->GetDisableGradientOpacity(0))
-  {
-    remark("Halite does not draw gradient opacity");
-  }
+  // With 2D functions, VTK says that there is gradient opacity.
   if (property->GetTransferFunctionMode() == vtkVolumeProperty::TF_2D)
   {
     remark("Halite does not draw 2D transfer functions; the 1D functions are used");
+  }
+  else if (property->HasGradientOpacity(0) && !property->GetDisableGradientOpacity(0))
+  {
+    remark("Halite does not draw gradient opacity");
   }
 
   ForwardLog();
@@ -633,10 +804,12 @@ void vtkHaliteMapper::Render(vtkRenderer* renderer, vtkVolume* volume)
       MatricesOf(renderer, toEye, toClip);
       view.worldToEye = &toEye;
       view.eyeToClip = &toClip;
-      view.width = static_cast<std::uint32_t>(std::ceil(viewport.Width / this->ImageSampleDistance));
-      view.height = static_cast<std::uint32_t>(std::ceil(viewport.Height / this->ImageSampleDistance));
+      // Where surfaces end rays there is nothing between two pixels.
+      const double distance = pass ? 1 : this->ImageSampleDistance;
+      view.width = static_cast<std::uint32_t>(std::ceil(viewport.Width / distance));
+      view.height = static_cast<std::uint32_t>(std::ceil(viewport.Height / distance));
       view.bottomUp = true;
-      view.maximum = this->GetBlendMode() == vtkUnstructuredGridVolumeMapper::MAXIMUM_INTENSITY_BLEND;
+      view.maximum = maximum;
       wanted << toEye << toClip << static_cast<double>(view.width) << static_cast<double>(view.height)
              << static_cast<std::uint64_t>(view.maximum);
       for (int i = 0; i < this->GetNumberOfClippingPlanes(); ++i)
@@ -653,6 +826,22 @@ void vtkHaliteMapper::Render(vtkRenderer* renderer, vtkVolume* volume)
     {
       return;
     }
+    Presenter& presenter = inner.PresenterOf(window);
+    if (pass)
+    {
+      if (frame.Pictured != wanted)
+      {
+        frame.Layers.clear();
+        frame.Texture = nullptr;
+        frame.Pictured = wanted;
+      }
+      if (inner.Peel(*this, content, view, presenter, frame, pass))
+      {
+        inner.Errors.clear();
+      }
+      this->TimeToDraw = Now() - start;
+      return;
+    }
     std::vector<float> depths;
     // Where nothing was drawn and nothing kept, nothing ends rays.
     if (renderer->GetNumberOfPropsRendered() > 0 || renderer->GetPreserveDepthBuffer() || !renderer->GetErase())
@@ -666,30 +855,17 @@ void vtkHaliteMapper::Render(vtkRenderer* renderer, vtkVolume* volume)
     }
     if (!frame.Texture || frame.Pictured != wanted || frame.Depths != depths)
     {
-          frame.Texture = nullptr;
+      frame.Texture = nullptr;
+      frame.Layers.clear();
       frame.Pictured = wanted;
       frame.Depths.swap(depths);
       view.depths = frame.Depths.empty() ? nullptr : frame.Depths.data();
-      {
-        Clock clock(this->PrepareTime);
-        inner.Prepare(*this, content);
-      }
-      Clock clock(this->CoreTime);
-      inner.Pixels.resize(std::size_t(4) * view.width * view.height);
-      const bool finished = inner.Renderer->render(view, inner.Pixels.data(), [&](double share) {
-        this->InvokeEvent(vtkCommand::VolumeMapperRenderProgressEvent, &share);
-        return !window->CheckAbortStatus();
-      });
-      ++this->NumberOfFrames;
-      if (!finished)
+      if (!inner.Draw(*this, content, view, window, inner.Pixels))
       {
         return;
       }
     }
     Clock clock(this->PresentTime);
-    // Handlers of events may have drawn elsewhere.
-    window->MakeCurrent();
-    Presenter& presenter = inner.PresenterOf(window);
     if (!frame.Texture)
     {
       frame.Texture = presenter.Upload(view.width, view.height, inner.Pixels);

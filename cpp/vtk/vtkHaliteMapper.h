@@ -11,7 +11,8 @@
  * function of component 0 in any colour space, its scalar opacity and that unit distance, and IndependentComponents: on, one component
  * or the magnitude is drawn as the colour function's vector mode says; off, two components are the values of the colour and opacity
  * functions, four are red, green, blue and opacity themselves (as in vtkProjectedTetrahedraMapper); both blend modes;
- * clipping planes; the volume's matrix, mirror images included; any camera; opaque geometry, wherever it is. Not honoured, and said
+ * clipping planes; the volume's matrix, mirror images included; any camera; opaque geometry, wherever it is, and with depth peeling
+ * of volumes translucent geometry (except with the maximum, which goes over it). Not honoured, and said
  * once as a warning, are shading, gradient opacity and 2D transfer functions.
  *
  * It is a vtkProjectedTetrahedraMapper so that it can take that one's place through VTK's object factory (see SetOverride). What
@@ -57,7 +58,9 @@ public:
 
   ///@{
   /**
-   * How: "auto" (the default) or "traverse".
+   * How: "auto" (the default) or "traverse", by rays that walk from cell to cell; or "project", which sorts cells by depth and blends
+   * them. That needs a device for graphics, be it in software, so it is an error with Device "cpu"; it refuses maximum intensity;
+   * and its order is right for some meshes only.
    */
   vtkSetStringMacro(Engine);
   vtkGetStringMacro(Engine);

@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+// The pass means its questions for the shaders of VTK's own mapper of image data: it has textures of depths, names them in a
+// shader's declarations, and sets them as that shader's parameters. A shader here writes the depths out instead.
+#include "Peeling.h"
+
+#include "vtkDualDepthPeelingPass.h"
+#include "vtkInformation.h"
+#include "vtkInformationObjectBaseVectorKey.h"
+#include "vtkNew.h"
+#include "vtkOpenGLFramebufferObject.h"
+#include "vtkOpenGLQuadHelper.h"
+#include "vtkOpenGLRenderWindow.h"
+#include "vtkOpenGLShaderCache.h"
+#include "vtkOpenGLState.h"
+#include "vtkPixelBufferObject.h"
+#include "vtkShaderProgram.h"
+#include "vtkTextureObject.h"
+#include "vtkVolume.h"
+
+#include <stdexcept>
+#include <string>
+
+namespace
+{
+
+// OpenGL's numbers, as in Presenter.cxx.
+const unsigned int One = 1, OneMinusSourceAlpha = 0x0303, Add = 0x8006, Largest = 0x8008, DepthTest = 0x0B71, Blend = 0x0BE2,
+                   CullFace = 0x0B44, ScissorTest = 0x0C11;
+
+// An outer depth is a layer that was peeled, an inner one the next; in front they are negative, and -1 is none.
+const char* const Questions[] = {
+  "//VTK::System::Dec\n"
+  "//VTK::Output::Dec\n"
+  "in vec2 texCoord;\n"
+  "uniform sampler2D innerDepthTex, outerDepthTex;\n"
+  "void main() {\n"
+  "  vec2 layers = texture(innerDepthTex, texCoord).xy;\n"
+  "  float opaque = texture(outerDepthTex, texCoord).y;\n"
+  "  float end = opaque < 0.0 ? 1.0 : opaque;\n"
+  "  gl_FragData[0] = layers.x == -1.0 ? vec4(0.0, 0.0, 0.0, end) : vec4(0.0, -layers.x, layers.y, end);\n"
+  "}\n",
+  "//VTK::System::Dec\n"
+  "//VTK::Output::Dec\n"
+  "in vec2 texCoord;\n"
+  "uniform sampler2D innerDepthTex, outerDepthTex, opaqueDepthTex;\n"
+  "void main() {\n"
+  "  vec2 next = texture(innerDepthTex, texCoord).xy;\n"
+  "  vec2 last = texture(outerDepthTex, texCoord).xy;\n"
+  "  float opaque = texture(opaqueDepthTex, texCoord).x;\n"
+  "  bool none = next.x == -1.0;\n"
+  "  float end = none ? last.y : -next.x;\n"
+  "  vec4 parts = vec4(-last.x, min(end, opaque), 0.0, 0.0);\n"
+  "  if (!none && end < opaque) { parts.zw = vec2(next.y, last.y); }\n"
+  "  gl_FragData[0] = last.x == -1.0 ? vec4(0.0) : parts;\n"
+  "}\n",
+  "//VTK::System::Dec\n"
+  "//VTK::Output::Dec\n"
+  "in vec2 texCoord;\n"
+  "uniform sampler2D depthRangeTex;\n"
+  "void main() {\n"
+  "  vec2 left = texture(depthRangeTex, texCoord).xy;\n"
+  "  gl_FragData[0] = left.x == -1.0 ? vec4(0.0) : vec4(0.0, 0.0, -left.x, left.y);\n"
+  "}\n",
+};
+
+// Where a volume is the first of a stage its picture is what is written; others go over it, as they come from far to near. What lies before all layers may be kept until the first layer was drawn: VTK's layers have 8 bits, and what is
+// written less often is rounded less often.
+const char* const Answers[] = {
+  "//VTK::System::Dec\n"
+  "//VTK::Output::Dec\n"
+  "in vec2 texCoord;\n"
+  "uniform sampler2D front, back;\n"
+  "void main() {\n"
+  "  gl_FragData[0] = texture(back, texCoord);\n"
+  "  gl_FragData[1] = texture(front, texCoord);\n"
+  "}\n",
+  "//VTK::System::Dec\n"
+  "//VTK::Output::Dec\n"
+  "in vec2 texCoord;\n"
+  "uniform sampler2D kept, front, back, lastFrontColorTex;\n"
+  "uniform int first;\n"
+  "void main() {\n"
+  "  gl_FragData[0] = texture(back, texCoord);\n"
+  "  vec4 before = texture(kept, texCoord);\n"
+  "  vec4 last = texture(lastFrontColorTex, texCoord);\n"
+  "  vec4 new = texture(front, texCoord);\n"
+  "  gl_FragData[1] = first != 0 ? before + (1.0 - before.a) * (last + (1.0 - last.a) * new)\n"
+  "                              : vec4(last.rgb * new.a + (1.0 - last.a) * new.rgb, new.a);\n"
+  "}\n",
+  "//VTK::System::Dec\n"
+  "//VTK::Output::Dec\n"
+  "in vec2 texCoord;\n"
+  "uniform sampler2D back;\n"
+  "void main() { gl_FragData[0] = texture(back, texCoord); }\n",
+};
+
+// The stage in which a volume was drawn last: the pass is modified whenever it turns to volumes.
+thread_local struct
+{
+  vtkOpenGLRenderPass* Pass;
+  vtkMTimeType Time;
+} Latest;
+
+}
+
+Peeling::Peeling(vtkOpenGLRenderWindow* window)
+  : Window(window)
+{
+}
+
+Peeling::~Peeling() = default;
+
+vtkOpenGLRenderPass* Peeling::PassOf(vtkAbstractMapper* mapper, vtkVolume* volume)
+{
+  vtkInformation* keys = volume->GetPropertyKeys();
+  vtkInformationObjectBaseVectorKey* passes = vtkOpenGLRenderPass::RenderPasses();
+  for (int i = 0; keys && keys->Has(passes) && i < passes->Size(keys); ++i)
+  {
+    if (auto pass = vtkDualDepthPeelingPass::SafeDownCast(passes->Get(keys, i)))
+    {
+      return StageOf(pass, mapper, volume) == Unknown ? nullptr : pass;
+    }
+  }
+  return nullptr;
+}
+
+Peeling::Stage Peeling::StageOf(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolume* volume)
+{
+  std::string vertex, geometry, fragment = "//VTK::DepthPeeling::Dec\n";
+  pass->PreReplaceShaderValues(vertex, geometry, fragment, mapper, volume);
+  const auto declares = [&](const char* name) { return fragment.find(name) != std::string::npos; };
+  return declares("lastFrontColorTex") ? Between
+    : declares("depthRangeTex")        ? Rest
+    : declares("outerDepthTex")        ? Outside
+                                       : Unknown;
+}
+
+vtkOpenGLQuadHelper& Peeling::Ready(std::unique_ptr<vtkOpenGLQuadHelper>& quad, const char* fragment)
+{
+  if (!quad)
+  {
+    quad.reset(new vtkOpenGLQuadHelper(this->Window, nullptr, fragment, ""));
+  }
+  else
+  {
+    this->Window->GetShaderCache()->ReadyShaderProgram(quad->Program);
+  }
+  if (!quad->Program)
+  {
+    throw std::runtime_error("the window refuses the shaders for depth peeling");
+  }
+  return *quad;
+}
+
+void Peeling::Ask(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolume* volume, int width, int height,
+  std::vector<Parts>& parts)
+{
+  this->Now = StageOf(pass, mapper, volume);
+  vtkOpenGLState* state = this->Window->GetState();
+  vtkOpenGLState::ScopedglViewport viewport(state);
+  vtkOpenGLState::ScopedglEnableDisable scissorTest(state, ScissorTest);
+  vtkOpenGLState::ScopedglEnableDisable depthTest(state, DepthTest);
+  vtkOpenGLState::ScopedglEnableDisable blend(state, Blend);
+  vtkOpenGLState::ScopedglEnableDisable cullFace(state, CullFace);
+  for (unsigned int setting : { ScissorTest, DepthTest, Blend, CullFace })
+  {
+    state->vtkglDisable(setting);
+  }
+  state->vtkglViewport(0, 0, width, height);
+
+  vtkNew<vtkTextureObject> depths;
+  depths->SetContext(this->Window);
+  vtkNew<vtkOpenGLFramebufferObject> buffer;
+  buffer->SetContext(this->Window);
+  if (!depths->Allocate2D(width, height, 4, VTK_FLOAT))
+  {
+    throw std::runtime_error("the window refuses a texture of 32-bit floats");
+  }
+  vtkOpenGLQuadHelper& quad = this->Ready(this->Questions[this->Now], ::Questions[this->Now]);
+  state->PushFramebufferBindings();
+  buffer->Bind();
+  buffer->AddColorAttachment(0, depths);
+  buffer->ActivateDrawBuffer(0);
+  pass->SetShaderParameters(quad.Program, mapper, volume);
+  quad.Render();
+  buffer->RemoveColorAttachment(0);
+  state->PopFramebufferBindings();
+
+  static_assert(sizeof(Parts) == 4 * sizeof(float), "four depths are read at once");
+  parts.resize(static_cast<std::size_t>(width) * height);
+  auto packed = vtkSmartPointer<vtkPixelBufferObject>::Take(depths->Download());
+  unsigned int size[2] = { static_cast<unsigned int>(width), static_cast<unsigned int>(height) };
+  vtkIdType steps[2] = { 0, 0 };
+  const bool read = packed && packed->Download2D(VTK_FLOAT, parts.data(), size, 4, steps);
+  buffer->ReleaseGraphicsResources(this->Window);
+  if (!read)
+  {
+    throw std::runtime_error("the depths of translucent surfaces cannot be read");
+  }
+}
+
+void Peeling::Answer(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolume* volume,
+  vtkTextureObject* kept, vtkTextureObject* front, vtkTextureObject* back)
+{
+  const bool first = Latest.Pass != pass || Latest.Time != pass->GetMTime();
+  Latest.Pass = pass;
+  Latest.Time = pass->GetMTime();
+
+  vtkOpenGLState* state = this->Window->GetState();
+  vtkOpenGLState::ScopedglEnableDisable depthTest(state, DepthTest);
+  vtkOpenGLState::ScopedglEnableDisable blend(state, Blend);
+  vtkOpenGLState::ScopedglEnableDisable cullFace(state, CullFace);
+  vtkOpenGLState::ScopedglBlendFuncSeparate blendFunction(state);
+  state->vtkglDisable(DepthTest);
+  state->vtkglDisable(CullFace);
+  const bool replaces = first && this->Now != Rest;
+  replaces ? state->vtkglDisable(Blend) : state->vtkglEnable(Blend);
+  state->vtkglBlendFuncSeparate(One, OneMinusSourceAlpha, One, OneMinusSourceAlpha);
+  state->vtkglBlendEquation(Add);
+
+  vtkOpenGLQuadHelper& quad = this->Ready(this->Answers[this->Now], ::Answers[this->Now]);
+  pass->SetShaderParameters(quad.Program, mapper, volume);
+  vtkTextureObject* const textures[] = { kept, front, back };
+  const char* const names[] = { "kept", "front", "back" };
+  for (int k = 0; k < 3; ++k)
+  {
+    textures[k]->Activate();
+    quad.Program->SetUniformi(names[k], textures[k]->GetTextureUnit());
+  }
+  quad.Program->SetUniformi("first", first);
+  quad.Render();
+  for (vtkTextureObject* texture : textures)
+  {
+    texture->Deactivate();
+  }
+  // What the pass has set for volumes.
+  state->vtkglBlendEquation(this->Now == Rest ? Add : Largest);
+}
