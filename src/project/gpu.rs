@@ -18,7 +18,6 @@ use crate::integral::table::{self, Table};
 use crate::order::depth::{self, HIDDEN, IN_PARTS};
 use crate::view::{Blend, View};
 use bytemuck::{Pod, Zeroable};
-use rayon::prelude::*;
 use std::time::Instant;
 use wgpu::{BufferUsages as Usage, ShaderStages as Stages, TextureUsages};
 

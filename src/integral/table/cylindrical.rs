@@ -3,7 +3,8 @@
 //! Where a projected cell is thin, l = 0 and s_f = s_b: all its fragments lie on a plane through the front diagonal of the
 //! table. So planes around that diagonal are sampled, each a square of two parameters, and the two nearest are interpolated.
 //! A place is told by (a, s, t) in [0, 1]³: which plane, how far from the diagonal, and where along it; equation 9 maps it to
-//! (S_f, S_b, l), scalars in [0, 1] and l over the longest length, and equation 10 back.
+//! (S_f, S_b, l), scalars in [0, 1] and l over the longest length, and equation 10 back. The mapping bends at a = ¼, ½ and ¾, so
+//! planes are there; those at a = 0 and 1 have no length and so hold nothing: they are one.
 
 use super::{between, is_scalar, published};
 use crate::integral::Exact;
@@ -12,28 +13,28 @@ use rayon::prelude::*;
 /// Colour and opacity on `planes` planes of `size` × `size` texels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cylindrical {
-    /// Planes around the diagonal, at equal steps of a from 0 to 1.
+    /// Planes around the diagonal, a multiple of 4: plane k is at a = k / planes.
     pub planes: u32,
     /// Texels along both axes of a plane; s varies fastest, then t, then the plane.
     pub size: u32,
     /// The longest length, in normalised units.
     pub longest: f64,
-    /// Premultiplied colour and opacity; where S_f would leave [0, 1], those of its nearer end.
+    /// Premultiplied colour and opacity; where S_f leaves [0, 1], of the function as it clamps.
     pub texels: Vec<[f32; 4]>,
 }
 
 impl Cylindrical {
     /// Integrates `exact` over segments of up to `longest` normalised units, on the current rayon pool. `None` for fields of
-    /// several components, and sizes less than 2.
+    /// several components, sizes less than 2, and numbers of planes that are not multiples of 4.
     pub fn new(exact: &Exact<f64>, planes: u32, size: u32, longest: f64) -> Option<Self> {
-        if !is_scalar(exact) || planes < 2 || size < 2 {
+        if !is_scalar(exact) || planes == 0 || !planes.is_multiple_of(4) || size < 2 {
             return None;
         }
         let share = |i: u32, n: u32| f64::from(i) / f64::from(n - 1);
         let texel = |i: u32| {
-            let [front, back, l] =
-                place(share(i / size / size, planes), share(i % size, size), share(i / size % size, size));
-            let [front, back] = [front, back].map(|s| 2.0 * s.clamp(0.0, 1.0) - 1.0);
+            let a = f64::from(i / size / size) / f64::from(planes);
+            let [front, back, l] = place(a, share(i % size, size), share(i / size % size, size));
+            let [front, back] = [front, back].map(|s| 2.0 * s - 1.0);
             published(exact, front, back, l * longest).map(|c| c as f32)
         };
         let texels = (0..planes.checked_mul(size)?.checked_mul(size)?).into_par_iter().map(texel).collect();
@@ -45,7 +46,8 @@ impl Cylindrical {
         let [a, s, t] = coordinates((front + 1.0) / 2.0, (back + 1.0) / 2.0, l / self.longest);
         let size = self.size as usize;
         let mut sum = [0.0; 4];
-        for (plane, of_plane) in between(a, self.planes) {
+        for (plane, of_plane) in between(a, self.planes + 1) {
+            let plane = plane % self.planes as usize;
             for (j, v) in between(t, self.size) {
                 for (i, u) in between(s, self.size) {
                     let texel = self.texels[(plane * size + j) * size + i];
