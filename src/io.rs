@@ -14,7 +14,7 @@ use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 /// What Halite knows of but does not read: extension, type attribute of the XML file, and what would help.
-const REFUSED: [(&str, &str, &str); 13] = [
+const REFUSED: [(&str, &str, &str); 24] = [
     ("pvd", "Collection", "a list of files, which Halite cannot read; open one of the .vtu that it lists"),
     ("vtm", "vtkMultiBlockDataSet", MULTIBLOCK),
     ("vtmb", "vtkMultiBlockDataSet", MULTIBLOCK),
@@ -28,7 +28,19 @@ const REFUSED: [(&str, &str, &str); 13] = [
     ("vtp", "PolyData", "surfaces without volume; Halite reads unstructured grids (.vtu)"),
     ("vth", "HierarchicalBoxDataSet", STRUCTURED),
     ("htg", "HyperTreeGrid", STRUCTURED),
+    ("pvtr", "PRectilinearGrid", STRUCTURED),
+    ("pvts", "PStructuredGrid", STRUCTURED),
+    ("pvtp", "PPolyData", "surfaces without volume; Halite reads unstructured grids (.vtu)"),
+    ("vtpd", "vtkPartitionedDataSet", MULTIBLOCK),
+    ("vthb", "vtkOverlappingAMR", STRUCTURED),
+    ("ex2", "Exodus", FOREIGN),
+    ("exo", "Exodus", FOREIGN),
+    ("e", "Exodus", FOREIGN),
+    ("cgns", "CGNS", FOREIGN),
+    ("msh", "mesh", FOREIGN),
+    ("case", "EnSight", FOREIGN),
 ];
+const FOREIGN: &str = "a file of another format, which Halite cannot read; open it in ParaView, save it as .vtu";
 const STRUCTURED: &str =
     "a structured grid; convert it to an unstructured grid (in ParaView: Append Datasets), save that as .vtu";
 const MULTIBLOCK: &str =
@@ -59,7 +71,11 @@ pub fn open(path: &Path, progress: &(dyn Fn(f64) + Sync)) -> Result<Mesh> {
         return Err(match known {
             _ if start.is_empty() => Error::malformed(path, "the file is empty"),
             Some((_, _, what)) => Error::unsupported(path, format!("this is {what}")),
-            None => Error::malformed(path, "this is neither a VTK XML file (.vtu) nor a legacy VTK file (.vtk)"),
+            None => {
+                let what =
+                    "this is neither a VTK XML file (.vtu) nor a legacy VTK file (.vtk), and Halite reads no others";
+                Error::malformed(path, what)
+            }
         });
     };
     progress(1.0);

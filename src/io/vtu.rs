@@ -15,6 +15,7 @@ use std::io::{BufRead, BufReader, Seek};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
+use std::sync::atomic::AtomicU64;
 
 /// Reads the unstructured grid in a VTK XML file, or in the files that it lists.
 pub(super) fn read(path: &Path, tell: &(dyn Fn(f64) + Sync)) -> Result<Mesh> {
@@ -142,8 +143,15 @@ impl Head {
     fn read(path: &Path) -> Result<Self> {
         let file = File::open(path).map_err(|e| Error::file(path, e))?;
         let length = file.metadata().map_err(|e| Error::file(path, e))?.len();
-        let store =
-            Store { path: path.to_owned(), length, big_endian: false, word: 4, compressor: None, appended: None };
+        let store = Store {
+            path: path.to_owned(),
+            length,
+            big_endian: false,
+            word: 4,
+            compressor: None,
+            appended: None,
+            used: AtomicU64::new(0),
+        };
         let mut head = Head {
             store,
             pieces: Vec::new(),
@@ -511,6 +519,12 @@ impl Grid<'_> {
                     };
                     let from = if *face == 0 { 0 } else { ends[*face as usize - 1] };
                     polyhedra.points.extend_from_slice(&points[from as usize..*end as usize]);
+                    // A face has two sides: what is named far more often makes much of little.
+                    if polyhedra.points.len() > 8 * points.len() {
+                        let what =
+                            format!("by polyhedron {cell} its faces are named 8 times each, but a face has two sides");
+                        return Err(self.malformed(piece, what));
+                    }
                     polyhedra.faces.push(polyhedra.points.len() as u64);
                 }
                 start = *end;
