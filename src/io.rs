@@ -51,7 +51,7 @@ const MULTIBLOCK: &str =
 ///
 /// The content decides: `.vtu` XML of every data mode, uncompressed or zlib, or a legacy `.vtk` file. Several pieces become one
 /// mesh, with the arrays that all pieces with points (or cells) have: of one number type if they agree, as f64 if not. Arrays of
-/// strings and bits, and field data, are left out. The work is done in the current rayon pool.
+/// strings, and field data, are left out. The work is done in the current rayon pool.
 ///
 /// # Errors
 /// [`Error::File`], [`Error::Malformed`] or [`Error::Unsupported`], naming the file and the place in it.

@@ -339,7 +339,12 @@ fn spellings_of_xml() {
     same(&text.replace(" byte_order=\"LittleEndian\" header_type=\"UInt32\"", ""));
     same(&text.replace("<Piece", "<FieldData><DataArray type='Float128' Name='x'>a & b</DataArray></FieldData><Piece"));
     same(&text.replace("<CellData>", "<CellData><DataArray type='String' Name='s' format='ascii'>65 0</DataArray>"));
-    same(&text.replace("<CellData>", "<CellData><DataArray type='Bit' Name='b' format='ascii'>1 0</DataArray>"));
+    // Bits, in text and as a byte after its size.
+    for bits in ["format='ascii'>1 0", "format='binary'>AQAAAIA="] {
+        let with = format!("<CellData><DataArray type='Bit' Name='b' {bits}</DataArray>");
+        let mesh = read(text.replace("<CellData>", &with).as_bytes()).unwrap();
+        assert_eq!(mesh.cell_arrays()[0], array("b", 1, Values::U8(vec![1, 0])));
+    }
     same(&text.replace("<CellData>", "<CellData><Array type='String' Name='s' format='appended' offset='7'/>"));
     same(&text.replace("\n</DataArray>", "<!-- end --><InformationKey>9 9</InformationKey></DataArray>"));
     same(&text.replace("NumberOfComponents=\"1\" format=\"ascii\"", "NumberOfComponents=\"\""));
@@ -602,7 +607,7 @@ fn legacy_arrays_of_every_kind() {
     assert!(c[0].is_nan() && c[1] == f32::NEG_INFINITY && c[2] == 100.0 && c[3].is_nan() && c[4] == f32::INFINITY);
     let [bits, rgb] = mesh.cell_arrays() else { panic!() };
     assert_eq!((&bits.name[..], &bits.values), ("b", &Values::U8(vec![1, 0])));
-    assert_eq!((rgb.components, &rgb.values), (3, &Values::U8(vec![0, 127, 255, 255, 255, 255])));
+    assert_eq!((rgb.components, &rgb.values), (3, &Values::U8(vec![0, 128, 255, 255, 255, 255])));
     // Points that are whole numbers, and everything on one line.
     let mesh = read_as(
         "mesh.vtk",
@@ -659,14 +664,14 @@ fn damaged_legacy_files() {
         "SCALARS id quad 1\n7 8\n",
         "there is no number type \"quad\"",
     );
-    told("FIELD FieldData", "FOUNTAIN FieldData", "FOUNTAIN, at byte 266: Halite does not know such a section");
-    told("T 1 5", "T 1 6", "array \"T\", at byte 266: it holds 5 numbers, not 6");
+    told("FIELD FieldData", "FOUNTAIN FieldData", "FOUNTAIN, at byte 278: Halite does not know such a section");
+    told("T 1 5", "T 1 6", "array \"T\", at byte 278: it holds 5 numbers, not 6");
     told("T 1 5", "T 1 18446744073709551615", "it holds 5 numbers");
     told("T 1 5", "T 2 18446744073709551615", "more values than any file can hold");
-    told("POINTS 5", "POINTS 4000000000", "POINTS, at byte 68: \"CELLS\" is not a number");
+    told("POINTS 5", "POINTS 4000000000", "POINTS, at byte 65: \"CELLS\" is not a number");
     told("CELL_DATA 2", "CELLS_DATA 2", "CELLS_DATA, at byte");
     told("ASCII", "EBCDIC", "its third line is \"EBCDIC\"");
-    told("ASCII", "BINARY", "POINTS, at byte");
+    told("ASCII", "BINARY", ", at byte");
     told("DATASET", "DATA", "no data set");
     told("1 2 3 4 5\n", "1 2 3 4 5\n1e\n", "1E, at byte");
 }

@@ -37,6 +37,8 @@ pub(super) struct DataArray {
     pub(super) piece: usize,
     pub(super) name: String,
     pub(super) kind: Kind,
+    /// Whether each number is a bit, of bytes.
+    pub(super) bits: bool,
     pub(super) components: usize,
     pub(super) data: Data,
 }
@@ -414,10 +416,8 @@ impl Blocks {
         }
         let per_block = (self.size / kind.size()).max(1);
         let per_chunk = CHUNK / kind.size();
-        let scratch = || Scratch {
-            numbers: vec![0; per_block.min(per_chunk) * kind.size() / 8 + 1],
-            unpacker: Unpacker::default(),
-        };
+        let most = per_block.min(per_chunk).min(out.len() / size);
+        let scratch = || Scratch { numbers: vec![0; most * kind.size() / 8 + 1], unpacker: Unpacker::default() };
         out.par_chunks_mut(per_block * size).enumerate().try_for_each_init(scratch, |scratch, (block, out)| {
             let Scratch { numbers, unpacker } = scratch;
             if let Some((codec, starts)) = &self.packed {

@@ -197,7 +197,7 @@ impl Parts {
         }
         let mut values = from.values(kind, components.checked_mul(tuples))?;
         if let ("COLOR_SCALARS", Some(Values::F32(shares))) = (keyword, &values) {
-            values = Some(Values::U8(shares.iter().map(|share| (share * 255.0) as u8).collect()));
+            values = Some(Values::U8(shares.iter().map(|share| (share * 255.0).round() as u8).collect()));
         }
         self.keep(&name, components, values);
         Ok(())
