@@ -115,7 +115,7 @@ fn images(scene: &Scene, view: &View) -> Vec<(&'static str, Image)> {
         }
     });
     let mut images = vec![("CPU", ENGINES[0].image(scene, view))];
-    if COUNT.fetch_add(1, Relaxed) % SOME == 0
+    if COUNT.fetch_add(1, Relaxed).is_multiple_of(SOME)
         && let Some(renderer) = &*DEVICE
     {
         let mut renderer = renderer.lock().unwrap();

@@ -93,7 +93,7 @@ fn legacy(n: usize) -> Vec<u8> {
     let mut file =
         format!("# vtk DataFile Version 3.0\nt\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS {points} double\n")
             .into_bytes();
-    file.extend(mesh.points().iter().flat_map(|p| p.to_array()).flat_map(f64::to_be_bytes));
+    file.extend(mesh.points().iter().flat_map(glam::DVec3::to_array).flat_map(f64::to_be_bytes));
     file.extend(format!("\nCELLS {cells} {}\n", 5 * cells).bytes());
     for c in 0..cells {
         file.extend(4u32.to_be_bytes());
@@ -164,7 +164,7 @@ fn memory_is_measured() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("mesh.vtu");
     let own = lattice(20);
-    std::fs::write(&path, write(Style { mode: Mode::AppendedRaw, ..PLAIN }, &[own.clone()])).unwrap();
+    std::fs::write(&path, write(Style { mode: Mode::AppendedRaw, ..PLAIN }, std::slice::from_ref(&own))).unwrap();
     let (bytes, mesh) = read(&path);
     let (points, cells) = (mesh.unwrap().points().len(), own.types.len());
     let kept = (24 + 8) * points + (16 + 8 + 1 + 8) * cells;

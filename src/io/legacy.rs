@@ -86,7 +86,7 @@ impl Parts {
             "CELLS" => self.cells(from)?,
             "CELL_TYPES" => {
                 let count = from.count("the number of cells")?;
-                from.to_numbers();
+                from.enter_numbers();
                 let types = from.numbers::<i32>(count)?.into_iter().enumerate();
                 let narrow = |(c, kind)| u8::try_from(kind).map_err(|_| format!("the type of cell {c} is {kind}"));
                 self.types = types.map(narrow).collect::<Result<_, _>>()?;
@@ -112,7 +112,7 @@ impl Parts {
             return Ok(());
         }
         if !from.pass("OFFSETS") {
-            from.to_numbers();
+            from.enter_numbers();
             let list = from.numbers::<i32>(size)?;
             let mut rest = &list[..];
             self.offsets = vec![0];
@@ -193,7 +193,7 @@ impl Parts {
             _ => (fixed, Type::from_name(&from.word("its type")?, from.binary)?),
         };
         if keyword == "SCALARS" {
-            from.to_table()?;
+            from.pass_table()?;
         }
         let mut values = from.values(kind, components.checked_mul(tuples))?;
         if let ("COLOR_SCALARS", Some(Values::F32(shares))) = (keyword, &values) {

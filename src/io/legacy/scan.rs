@@ -136,7 +136,7 @@ impl<'a> Scanner<'a> {
         if what == Type::Strings {
             self.line();
         } else {
-            self.to_numbers();
+            self.enter_numbers();
         }
         Ok(match what {
             Type::Numbers { stored, kept } if stored == kept => {
@@ -175,14 +175,14 @@ impl<'a> Scanner<'a> {
     }
 
     /// Goes to where numbers start: the next line if they are no text.
-    pub(super) fn to_numbers(&mut self) {
+    pub(super) fn enter_numbers(&mut self) {
         if self.binary {
             self.line();
         }
     }
 
     /// Passes the rest of the line of scalars, and the name of their table of colours if it follows.
-    pub(super) fn to_table(&mut self) -> Result<(), Fault> {
+    pub(super) fn pass_table(&mut self) -> Result<(), Fault> {
         let before = self.at;
         self.line();
         if self.pass("LOOKUP_TABLE") {
