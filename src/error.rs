@@ -7,12 +7,12 @@ use std::path::{Path, PathBuf};
 #[non_exhaustive]
 pub enum Error {
     /// The operating system could not read or write a file.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {answer}", path.display())]
     File {
         /// The file.
         path: PathBuf,
-        /// The system's answer.
-        source: std::io::Error,
+        /// The system's answer. It is part of the line, and so no source of the error, which would be told twice.
+        answer: std::io::Error,
     },
     /// A file does not hold what its format demands.
     #[error("{}: {what}", path.display())]
@@ -72,8 +72,8 @@ pub enum Error {
 }
 
 impl Error {
-    pub(crate) fn file(path: &Path, source: std::io::Error) -> Self {
-        Error::File { path: path.to_owned(), source }
+    pub(crate) fn file(path: &Path, answer: std::io::Error) -> Self {
+        Error::File { path: path.to_owned(), answer }
     }
 
     pub(crate) fn malformed(path: &Path, what: impl Into<String>) -> Self {

@@ -14,7 +14,7 @@ use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 /// What Halite knows of but does not read: extension, type attribute of the XML file, and what would help.
-const REFUSED: [(&str, &str, &str); 13] = [
+const REFUSED: [(&str, &str, &str); 24] = [
     ("pvd", "Collection", "a list of files, which Halite cannot read; open one of the .vtu that it lists"),
     ("vtm", "vtkMultiBlockDataSet", MULTIBLOCK),
     ("vtmb", "vtkMultiBlockDataSet", MULTIBLOCK),
@@ -28,7 +28,19 @@ const REFUSED: [(&str, &str, &str); 13] = [
     ("vtp", "PolyData", "surfaces without volume; Halite reads unstructured grids (.vtu)"),
     ("vth", "HierarchicalBoxDataSet", STRUCTURED),
     ("htg", "HyperTreeGrid", STRUCTURED),
+    ("pvtr", "PRectilinearGrid", STRUCTURED),
+    ("pvts", "PStructuredGrid", STRUCTURED),
+    ("pvtp", "PPolyData", "surfaces without volume; Halite reads unstructured grids (.vtu)"),
+    ("vtpd", "vtkPartitionedDataSet", MULTIBLOCK),
+    ("vthb", "vtkOverlappingAMR", STRUCTURED),
+    ("ex2", "Exodus", FOREIGN),
+    ("exo", "Exodus", FOREIGN),
+    ("e", "Exodus", FOREIGN),
+    ("cgns", "CGNS", FOREIGN),
+    ("msh", "mesh", FOREIGN),
+    ("case", "EnSight", FOREIGN),
 ];
+const FOREIGN: &str = "a file of another format, which Halite cannot read; open it in ParaView, save it as .vtu";
 const STRUCTURED: &str =
     "a structured grid; convert it to an unstructured grid (in ParaView: Append Datasets), save that as .vtu";
 const MULTIBLOCK: &str =
@@ -39,7 +51,7 @@ const MULTIBLOCK: &str =
 ///
 /// The content decides: `.vtu` XML of every data mode, uncompressed or zlib, or a legacy `.vtk` file. Several pieces become one
 /// mesh, with the arrays that all pieces with points (or cells) have: of one number type if they agree, as f64 if not. Arrays of
-/// strings and bits, and field data, are left out. The work is done in the current rayon pool.
+/// strings, and field data, are left out. The work is done in the current rayon pool.
 ///
 /// # Errors
 /// [`Error::File`], [`Error::Malformed`] or [`Error::Unsupported`], naming the file and the place in it.
@@ -59,7 +71,11 @@ pub fn open(path: &Path, progress: &(dyn Fn(f64) + Sync)) -> Result<Mesh> {
         return Err(match known {
             _ if start.is_empty() => Error::malformed(path, "the file is empty"),
             Some((_, _, what)) => Error::unsupported(path, format!("this is {what}")),
-            None => Error::malformed(path, "this is neither a VTK XML file (.vtu) nor a legacy VTK file (.vtk)"),
+            None => {
+                let what =
+                    "this is neither a VTK XML file (.vtu) nor a legacy VTK file (.vtk), and Halite reads no others";
+                Error::malformed(path, what)
+            }
         });
     };
     progress(1.0);

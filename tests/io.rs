@@ -2,12 +2,13 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
-use base64::Engine;
-use base64::prelude::BASE64_STANDARD;
-use halite::mesh::{Array, Mesh, Values};
+#[path = "common/files.rs"]
+mod files;
+
+use files::{Codec, LEGACY, Mode, PLAIN, Piece, Random, Style, array, ascii, mutated, piece, styles, write};
+use halite::mesh::{Mesh, Values};
 use halite::{Error, Result};
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
@@ -38,197 +39,6 @@ fn malformed(bytes: &[u8]) -> String {
     }
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Mode {
-    Ascii,
-    Inline,
-    AppendedBase64,
-    AppendedRaw,
-}
-
-/// How a file is written.
-#[derive(Debug, Clone, Copy)]
-struct Style {
-    mode: Mode,
-    big_endian: bool,
-    wide: bool,
-    /// Bytes per packed block.
-    block: Option<usize>,
-    codec: Codec,
-    /// Header and data of uncompressed base64 in one piece, as VTK does, or each on its own, as FEniCS does.
-    together: bool,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Codec {
-    ZLib,
-    LZ4,
-    Lzma,
-}
-
-const PLAIN: Style =
-    Style { mode: Mode::Ascii, big_endian: false, wide: false, block: None, codec: Codec::ZLib, together: true };
-
-macro_rules! bytes_of {
-    ($v:expr, $big:expr) => {
-        $v.iter().flat_map(|x| if $big { x.to_be_bytes().to_vec() } else { x.to_le_bytes().to_vec() }).collect()
-    };
-}
-
-/// Type name, bytes and text of values.
-fn told(values: &Values, big: bool) -> (&'static str, Vec<u8>, String) {
-    macro_rules! arms {
-        ($($variant:ident $name:literal),*) => {
-            match values {
-                $(Values::$variant(v) => ($name, bytes_of!(v, big), v.iter().map(|x| format!(" {x}")).collect())),*
-            }
-        };
-    }
-    arms!(I8 "Int8", U8 "UInt8", I16 "Int16", U16 "UInt16", I32 "Int32", U32 "UInt32", I64 "Int64", U64 "UInt64",
-        F32 "Float32", F64 "Float64")
-}
-
-impl Codec {
-    fn pack(self, bytes: &[u8]) -> Vec<u8> {
-        match self {
-            Codec::ZLib => {
-                let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::default());
-                encoder.write_all(bytes).unwrap();
-                encoder.finish().unwrap()
-            }
-            Codec::LZ4 => lz4_flex::block::compress(bytes),
-            Codec::Lzma => {
-                let mut encoder = lzma_rust2::XzWriter::new(Vec::new(), lzma_rust2::XzOptions::with_preset(1)).unwrap();
-                encoder.write_all(bytes).unwrap();
-                encoder.finish().unwrap()
-            }
-        }
-    }
-}
-
-impl Style {
-    fn words(&self, words: &[usize]) -> Vec<u8> {
-        match self.wide {
-            true => bytes_of!(words.iter().map(|w| *w as u64).collect::<Vec<_>>(), self.big_endian),
-            false => bytes_of!(words.iter().map(|w| *w as u32).collect::<Vec<_>>(), self.big_endian),
-        }
-    }
-
-    /// Header and body of an array.
-    fn parts(&self, bytes: &[u8]) -> (Vec<u8>, Vec<u8>) {
-        let Some(block) = self.block else { return (self.words(&[bytes.len()]), bytes.to_vec()) };
-        let blocks: Vec<Vec<u8>> = bytes.chunks(block).map(|part| self.codec.pack(part)).collect();
-        let mut head = vec![blocks.len(), block, bytes.len() % block];
-        head.extend(blocks.iter().map(Vec::len));
-        (self.words(&head), blocks.concat())
-    }
-
-    fn encoded(&self, bytes: &[u8]) -> Vec<u8> {
-        let (head, body) = self.parts(bytes);
-        match self.mode {
-            Mode::AppendedRaw => [head, body].concat(),
-            _ if self.together && self.block.is_none() => BASE64_STANDARD.encode([head, body].concat()).into_bytes(),
-            _ => (BASE64_STANDARD.encode(head) + &BASE64_STANDARD.encode(body)).into_bytes(),
-        }
-    }
-}
-
-/// A piece to be written: points as an array, cells as arrays of any type, data.
-#[derive(Clone)]
-struct Piece {
-    points: Values,
-    connectivity: Values,
-    offsets: Values,
-    types: Values,
-    point_data: Vec<Array>,
-    cell_data: Vec<Array>,
-}
-
-fn array(name: &str, components: usize, values: Values) -> Array {
-    Array { name: name.to_owned(), components, values }
-}
-
-/// A tetrahedron and a wedge that share no point, and enough values to fill several blocks.
-fn piece() -> Piece {
-    Piece {
-        points: Values::F64((0..30).map(|i| f64::from(i * i % 17) * 0.375 - 1.0).collect()),
-        connectivity: Values::I64((0..10).collect()),
-        offsets: Values::I64(vec![4, 10]),
-        types: Values::U8(vec![10, 13]),
-        point_data: vec![
-            array("T", 1, Values::F32((0..10u8).map(|i| f32::from(i) * 0.125).collect())),
-            array("v", 9, Values::F64((0..90).map(|i| f64::from(i).sqrt()).collect())),
-        ],
-        cell_data: vec![array("id", 1, Values::I32(vec![-7, 1 << 30]))],
-    }
-}
-
-fn write(style: Style, pieces: &[Piece]) -> Vec<u8> {
-    let mut appended: Vec<u8> = Vec::new();
-    let mut head = String::from("<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"0.1\"");
-    write!(head, " byte_order=\"{}Endian\"", if style.big_endian { "Big" } else { "Little" }).unwrap();
-    write!(head, " header_type=\"UInt{}\"", if style.wide { 64 } else { 32 }).unwrap();
-    if style.block.is_some() {
-        let name = match style.codec {
-            Codec::ZLib => "ZLib",
-            Codec::LZ4 => "LZ4",
-            Codec::Lzma => "LZMA",
-        };
-        write!(head, " compressor=\"vtk{name}DataCompressor\"").unwrap();
-    }
-    head += ">\n<UnstructuredGrid>\n";
-    for piece in pieces {
-        let (points, cells) = (piece.points.len() / 3, piece.types.len());
-        writeln!(head, "<Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{cells}\">").unwrap();
-        let topology = vec![
-            array("connectivity", 1, piece.connectivity.clone()),
-            array("offsets", 1, piece.offsets.clone()),
-            array("types", 1, piece.types.clone()),
-        ];
-        let sections = [
-            ("PointData", piece.point_data.clone()),
-            ("CellData", piece.cell_data.clone()),
-            ("Points", vec![array("Points", 3, piece.points.clone())]),
-            ("Cells", topology),
-        ];
-        for (section, arrays) in sections {
-            writeln!(head, "<{section}>").unwrap();
-            for Array { name, components, values } in arrays {
-                let (kind, bytes, text) = told(&values, style.big_endian);
-                write!(head, "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" ")
-                    .unwrap();
-                match style.mode {
-                    Mode::Ascii => writeln!(head, "format=\"ascii\">\n{text}\n</DataArray>").unwrap(),
-                    Mode::Inline => {
-                        let text = String::from_utf8(style.encoded(&bytes)).unwrap();
-                        writeln!(head, "format=\"binary\">\n   {text}\n  </DataArray>").unwrap();
-                    }
-                    Mode::AppendedBase64 | Mode::AppendedRaw => {
-                        writeln!(head, "format=\"appended\" offset=\"{}\"/>", appended.len()).unwrap();
-                        appended.extend(style.encoded(&bytes));
-                    }
-                }
-            }
-            writeln!(head, "</{section}>").unwrap();
-        }
-        head += "</Piece>\n";
-    }
-    head += "</UnstructuredGrid>\n";
-    let mut file = head.into_bytes();
-    if matches!(style.mode, Mode::AppendedRaw | Mode::AppendedBase64) {
-        let encoding = if style.mode == Mode::AppendedRaw { "raw" } else { "base64" };
-        file.extend(format!("<AppendedData encoding=\"{encoding}\">\n   _").bytes());
-        file.extend(appended);
-        file.extend(b"\n</AppendedData>\n");
-    }
-    file.extend(b"</VTKFile>\n");
-    file
-}
-
-fn ascii(pieces: &[Piece]) -> String {
-    String::from_utf8(write(PLAIN, pieces)).unwrap()
-}
-
 fn floats(values: &Values) -> Vec<f64> {
     (0..values.len()).map(|i| values.get(i)).collect()
 }
@@ -244,29 +54,6 @@ fn assert_holds(mesh: &Mesh, piece: &Piece, what: impl std::fmt::Debug) {
     assert_eq!(mesh.cells().connectivity, [0, 1, 2, 3, 4, 5, 6, 7, 8, 9], "{what:?}");
     assert_eq!(mesh.point_arrays(), piece.point_data, "{what:?}");
     assert_eq!(mesh.cell_arrays(), piece.cell_data, "{what:?}");
-}
-
-/// Every way to write a file that is read. Blocks of 72 bytes hold whole numbers of any type and end with the array "v", those of
-/// 100 bytes do not, and those of 50 bytes cut numbers in two.
-fn styles() -> Vec<Style> {
-    let mut styles = Vec::new();
-    for mode in [Mode::Ascii, Mode::Inline, Mode::AppendedBase64, Mode::AppendedRaw] {
-        for big_endian in [false, true] {
-            for wide in [false, true] {
-                let style = Style { mode, big_endian, wide, ..PLAIN };
-                for block in [Some(72), Some(100), Some(50), Some(1 << 15)] {
-                    styles.push(Style { block, together: false, ..style });
-                }
-                for codec in [Codec::LZ4, Codec::Lzma] {
-                    styles.push(Style { block: Some([50, 72][usize::from(wide)]), codec, together: false, ..style });
-                }
-                for together in [true, false] {
-                    styles.push(Style { together, ..style });
-                }
-            }
-        }
-    }
-    styles
 }
 
 #[test]
@@ -552,7 +339,12 @@ fn spellings_of_xml() {
     same(&text.replace(" byte_order=\"LittleEndian\" header_type=\"UInt32\"", ""));
     same(&text.replace("<Piece", "<FieldData><DataArray type='Float128' Name='x'>a & b</DataArray></FieldData><Piece"));
     same(&text.replace("<CellData>", "<CellData><DataArray type='String' Name='s' format='ascii'>65 0</DataArray>"));
-    same(&text.replace("<CellData>", "<CellData><DataArray type='Bit' Name='b' format='ascii'>1 0</DataArray>"));
+    // Bits, in text and as a byte after its size.
+    for bits in ["format='ascii'>1 0", "format='binary'>AQAAAIA="] {
+        let with = format!("<CellData><DataArray type='Bit' Name='b' {bits}</DataArray>");
+        let mesh = read(text.replace("<CellData>", &with).as_bytes()).unwrap();
+        assert_eq!(mesh.cell_arrays()[0], array("b", 1, Values::U8(vec![1, 0])));
+    }
     same(&text.replace("<CellData>", "<CellData><Array type='String' Name='s' format='appended' offset='7'/>"));
     same(&text.replace("\n</DataArray>", "<!-- end --><InformationKey>9 9</InformationKey></DataArray>"));
     same(&text.replace("NumberOfComponents=\"1\" format=\"ascii\"", "NumberOfComponents=\"\""));
@@ -760,11 +552,6 @@ fn what_is_not_read_is_refused_by_name() {
     assert!(what.contains("ImageData"), "{what}");
 }
 
-const LEGACY: &str = "# vtk DataFile Version 3.0\ntitle\nASCII\nDATASET UNSTRUCTURED_GRID\n\
-    POINTS 5 float\n0 0 0 1 0 0 0 1 0 0 0 1\n1 1 1\nCELLS 2 10\n4 0 1 2 3\n4 1 2 3 4\nCELL_TYPES 2\n10 10\n\
-    CELL_DATA 2\nSCALARS id int 1\nLOOKUP_TABLE default\n7 8\n\
-    POINT_DATA 5\nVECTORS v%20x double\n0 0 0 0 0 1 0 1 0 0 1 1 2 2 2\nFIELD FieldData 1\nT 1 5 float\n1 2 3 4 5\n";
-
 #[test]
 fn legacy_files() {
     let mesh = read_as("mesh.vtk", LEGACY.as_bytes()).unwrap();
@@ -802,45 +589,91 @@ fn legacy_files_with_field_data_and_polyhedra() {
 }
 
 #[test]
+fn legacy_arrays_of_every_kind() {
+    let base = LEGACY.split("CELL_DATA").next().unwrap();
+    let with = |text: &str| read_as("mesh.vtk", format!("{base}{text}").as_bytes()).unwrap();
+    let mesh = with(
+        "POINT_DATA 5\nSCALARS s unsigned_short\n0 1 65535 3 4\nGLOBAL_IDS g vtkIdType\n5 6 7 8 9000000000\n\
+        PEDIGREE_IDS names string\na\nb c\n\nPOINTS\nd\nTENSORS6 t float\n1 1 1 1 1 1 2 2 2 2 2 2 3 3 3 3 3 3 4 4 4 4 4 4 5 5 5 5 5 5\n\
+        METADATA\nINFORMATION 0\n\nLOOKUP_TABLE own 1\n1 0 0.5 1\nSCALARS c float 1\nLOOKUP_TABLE own\nnan -inf 1e2 -nan(ind) 1.#INF\n\
+        CELL_DATA 2\nFIELD FieldData 3\nb 1 2 bit\n1 0\nwords 1 2 string\nx\ny\nNULL_ARRAY\nCOLOR_SCALARS rgb 3\n0 0.5 1 1 1 1\n",
+    );
+    let names: Vec<&str> = mesh.point_arrays().iter().map(|a| &a.name[..]).collect();
+    assert_eq!(names, ["s", "g", "t", "c"]);
+    assert_eq!(mesh.point_arrays()[0].values, Values::U16(vec![0, 1, 65535, 3, 4]));
+    assert_eq!(mesh.point_arrays()[1].values, Values::I64(vec![5, 6, 7, 8, 9_000_000_000]));
+    assert_eq!(mesh.point_arrays()[2].components, 6);
+    let Values::F32(c) = &mesh.point_arrays()[3].values else { panic!() };
+    assert!(c[0].is_nan() && c[1] == f32::NEG_INFINITY && c[2] == 100.0 && c[3].is_nan() && c[4] == f32::INFINITY);
+    let [bits, rgb] = mesh.cell_arrays() else { panic!() };
+    assert_eq!((&bits.name[..], &bits.values), ("b", &Values::U8(vec![1, 0])));
+    assert_eq!((rgb.components, &rgb.values), (3, &Values::U8(vec![0, 128, 255, 255, 255, 255])));
+    // Points that are whole numbers, and everything on one line.
+    let mesh = read_as(
+        "mesh.vtk",
+        LEGACY.replace("5 float\n", "5 int ").replace("CELL_TYPES 2\n", "CELL_TYPES 2 ").as_bytes(),
+    );
+    assert_eq!(mesh.unwrap().points()[4], glam::DVec3::ONE);
+}
+
+#[test]
+fn binary_legacy_files() {
+    let be = |list: &[i32]| -> Vec<u8> { list.iter().flat_map(|i| i.to_be_bytes()).collect() };
+    let floats = |list: &[f32]| -> Vec<u8> { list.iter().flat_map(|x| x.to_be_bytes()).collect() };
+    let mut file = b"# vtk DataFile Version 4.2\nt\nBINARY\nDATASET UNSTRUCTURED_GRID\n\
+        FIELD FieldData 2\nTIME 1 1 double\n........\nlog 1 2 string\n\xc2hi\x80\x05POINT\nPOINTS 4 float\n"
+        .to_vec();
+    file.extend(floats(&[0., 0., 0., 1., 0., 0., 0., 1., 0., 0., 0., 1.]));
+    for (head, body) in [
+        ("\nCELLS 1 5\n", be(&[4, 0, 1, 2, 3])),
+        ("\nCELL_TYPES 1\n", be(&[10])),
+        ("\nPOINT_DATA 4\nSCALARS us unsigned_short 1\nLOOKUP_TABLE default\n", vec![0, 1, 255, 255, 0, 3, 0, 10]),
+        // Bytes that are blanks must not be taken for such.
+        ("\nGLOBAL_IDS g vtkIdType\n", be(&[0x0a0a_2020, 1, 2, 0x2020_0a0a])),
+        ("\nFIELD FieldData 2\nb 1 4 bit\n", vec![0b1011_0000]),
+        ("\nu 1 4 unsigned_char\n", b"\n\n  ".to_vec()),
+        ("\nMETADATA\nINFORMATION 0\n\nLOOKUP_TABLE own 1\n", vec![10, 32, 10, 32]),
+    ] {
+        file.extend(head.bytes());
+        file.extend(body);
+    }
+    let mesh = read_as("mesh.vtk", &file).unwrap();
+    assert_eq!((mesh.points()[3], mesh.cells().points(0)), (glam::DVec3::Z, &[0, 1, 2, 3][..]));
+    let [us, g, b, u] = mesh.point_arrays() else { panic!("{mesh:?}") };
+    assert_eq!(us.values, Values::U16(vec![1, 65535, 3, 10]));
+    assert_eq!(g.values, Values::I64(vec![0x0a0a_2020, 1, 2, 0x2020_0a0a]));
+    assert_eq!((&b.values, &u.values), (&Values::U8(vec![1, 0, 1, 1]), &Values::U8(b"\n\n  ".to_vec())));
+    for cut in 1..file.len() {
+        // Whatever is missing, it is an error, or all of the arrays that are there.
+        let _ = read_as("mesh.vtk", &file[..cut]);
+    }
+}
+
+#[test]
 fn damaged_legacy_files() {
     let told = |from: &str, to: &str, expected: &str| {
+        assert!(LEGACY.contains(from), "{from}");
         let error = read_as("mesh.vtk", LEGACY.replacen(from, to, 1).as_bytes()).unwrap_err().to_string();
         assert!(error.contains("mesh.vtk") && error.contains(expected), "{error}");
     };
     told("4 1 2 3 4\n", "4 1 2 3 5\n", "cell 1 names point 5");
     told("4 1 2 3 4\n", "5 1 2 3 4\n", "cell 1 has more points");
-    told("SCALARS id int 1\nLOOKUP_TABLE default\n7 8\n", "SCALARS id int 2\n7 8\n", "vtkio cannot parse");
-    told("FIELD FieldData", "GLOBAL_IDS FieldData", "vtkio stops at byte");
-    told("POINTS 5", "POINTS 4000000000", "vtkio cannot parse");
-    told("1 2 3 4 5\n", "1 2 nan 4 5\n", "vtkio");
-}
-
-/// A generator of pseudo-random numbers (xorshift64*).
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, limit: usize) -> usize {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        ((self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 32) % limit.max(1) as u64) as usize
-    }
-}
-
-/// Damages a file in one to four places.
-fn mutated(bytes: &[u8], random: &mut Random) -> Vec<u8> {
-    let mut bytes = bytes.to_vec();
-    for _ in 0..=random.below(4) {
-        let at = random.below(bytes.len());
-        match random.below(8) {
-            0 => bytes.truncate(at),
-            1 => drop(bytes.drain(at..(at + random.below(20)).min(bytes.len()))),
-            2 => drop(bytes.splice(at..at, b"<&>\"'_-9"[random.below(8)..].to_vec())),
-            3 | 4 => bytes.iter_mut().skip(at).take(1 + random.below(8)).for_each(|b| *b = 0xff),
-            _ => bytes.iter_mut().skip(at).take(1).for_each(|b| *b = random.below(256) as u8),
-        }
-    }
-    bytes
+    told("SCALARS id int 1\n", "SCALARS id int 2\n", "array \"id\", at byte 172: \"POINT_DATA\" is not a number");
+    told(
+        "SCALARS id int 1\nLOOKUP_TABLE default\n7 8\n",
+        "SCALARS id quad 1\n7 8\n",
+        "there is no number type \"quad\"",
+    );
+    told("FIELD FieldData", "FOUNTAIN FieldData", "FOUNTAIN, at byte 278: Halite does not know such a section");
+    told("T 1 5", "T 1 6", "array \"T\", at byte 278: it holds 5 numbers, not 6");
+    told("T 1 5", "T 1 18446744073709551615", "it holds 5 numbers");
+    told("T 1 5", "T 2 18446744073709551615", "more values than any file can hold");
+    told("POINTS 5", "POINTS 4000000000", "POINTS, at byte 65: \"CELLS\" is not a number");
+    told("CELL_DATA 2", "CELLS_DATA 2", "CELLS_DATA, at byte");
+    told("ASCII", "EBCDIC", "its third line is \"EBCDIC\"");
+    told("ASCII", "BINARY", ", at byte");
+    told("DATASET", "DATA", "no data set");
+    told("1 2 3 4 5\n", "1 2 3 4 5\n1e\n", "1E, at byte");
 }
 
 #[test]

@@ -45,6 +45,7 @@ impl Place {
         assert_eq!((code, out.as_str()), (Some(1), ""), "{arguments}: {err}");
         assert!(err.starts_with("halite: ") && err.trim_end().lines().count() == 1, "{arguments}: {err}");
         assert!(parts.iter().all(|p| err.contains(p)), "{arguments}: no {parts:?} in {err}");
+        assert!(err.matches("os error").count() <= 1, "{arguments}: {err}");
     }
 
     /// A run that is not understood.
@@ -125,6 +126,22 @@ fn failures_are_one_line() {
     place.write("lost.json", &SCENE.replace("cube.vtu", "sub/lost.vtu"));
     place.fails("render none.vtu --out x.png", &["none.vtu"]);
     place.fails("info none.vtu", &["none.vtu"]);
+    place.write("bare.vtu", &ODD.replace("CellData", "Nothing").replace("nan", "7"));
+    place.fails("render bare.vtu --out x.png", &["bare.vtu", "no array of points or cells"]);
+    place.fails("render . --out x.png", &["halite: .: "]);
+    for (name, text, part) in [
+        ("a.vti", "<VTKFile type='ImageData'/>", "a structured grid"),
+        ("a.pvd", "<VTKFile type='Collection'/>", "a list of files"),
+        ("a.vtm", "<VTKFile type='vtkMultiBlockDataSet'/>", "Merge Blocks"),
+        ("a.vtkhdf", "\u{7f}HDF", "a VTKHDF file"),
+        ("a.ex2", "CDF", "ParaView"),
+        ("a.txt", "hello", "neither a VTK XML file"),
+        ("empty.vtu", "", "the file is empty"),
+    ] {
+        place.write(name, text);
+        place.fails(&format!("info {name}"), &[name, part]);
+        place.fails(&format!("render {name} --out x.png"), &[name, part]);
+    }
     place.fails("render none.json --out x.png", &["none.json"]);
     place.fails("render cube.vtu --out x.png --scalars t", &["cube.vtu", "\"t\"", "\"s\"", "\"v\"", "\"c\""]);
     place.fails("render cube.vtu --out x.png --scalars v --component 3", &["component 3"]);
@@ -151,6 +168,39 @@ fn info_tells_what_is_there() {
     }
     for part in ["3 x f32", "0 to 6", "1 to 9 (1 NaN)", "48  boundary faces", "1  components", "\"s\" if no other"] {
         assert!(told.contains(part), "no {part} in {told}");
+    }
+}
+
+/// A tetrahedron, and again a little aside; others turned over, hidden, flat, with two corners at one place, with one that is nowhere.
+const ODD: &str = r#"<VTKFile type="UnstructuredGrid"><UnstructuredGrid><Piece NumberOfPoints="17" NumberOfCells="8">
+    <CellData><DataArray type="UInt8" Name="vtkGhostType" format="ascii">0 0 0 1 0 0 0 0</DataArray></CellData>
+    <Points><DataArray type="Float64" NumberOfComponents="3" format="ascii">0 0 0 1 0 0 0 1 0 0 0 1
+        0.1 0.1 0.1 1.1 0.1 0.1 0.1 1.1 0.1 0.1 0.1 1.1 5 0 0 6 0 0 5 1 0 5 0 1 nan 0 0 6 1 0 9 0 0 9 1 0 9 0 1</DataArray></Points>
+    <Cells><DataArray type="Int64" Name="connectivity" format="ascii">
+        0 1 2 3 4 5 6 7 8 10 9 11 0 1 2 3 8 9 10 13 14 14 15 16 0 1 2 12 0 1</DataArray>
+    <DataArray type="Int64" Name="offsets" format="ascii">4 8 12 16 20 24 28 30</DataArray>
+    <DataArray type="UInt8" Name="types" format="ascii">10 10 10 10 10 10 10 3</DataArray></Cells>
+    </Piece></UnstructuredGrid></VTKFile>"#;
+
+#[test]
+fn info_tells_what_is_odd() {
+    let place = Place::new();
+    place.write("odd.vtu", ODD);
+    let told = place.succeeds("info odd.vtu");
+    for part in [
+        "1 points are not finite",
+        "1  line  not drawn: no volume",
+        "5  cells\n",
+        "1  cells left out: no volume",
+        "1  cells left out: ghosts",
+        "1  cells left out: a point is not finite",
+        "2  tetrahedra turned inside out",
+        "1  tetrahedra with two corners at one place",
+        "1  tetrahedra of no volume",
+        "boundary faces inside other cells: cells overlap",
+        "of memory to render one scalar",
+    ] {
+        assert!(told.contains(part), "no {part:?} in {told}");
     }
 }
 

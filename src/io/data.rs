@@ -15,6 +15,7 @@ use std::fmt::{Display, Formatter};
 use std::fs::File;
 use std::ops::Range;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// Bytes of a chunk of an array that is not packed: small enough for the cache, large enough for a system call.
 const CHUNK: usize = 1 << 18;
@@ -36,6 +37,8 @@ pub(super) struct DataArray {
     pub(super) piece: usize,
     pub(super) name: String,
     pub(super) kind: Kind,
+    /// Whether each number is a bit, of bytes.
+    pub(super) bits: bool,
     pub(super) components: usize,
     pub(super) data: Data,
 }
@@ -73,7 +76,13 @@ pub(super) struct Store {
     pub(super) word: u64,
     pub(super) compressor: Option<String>,
     pub(super) appended: Option<Appended>,
+    /// Bytes of the file that arrays were made of so far, some perhaps more than once.
+    pub(super) used: AtomicU64,
 }
+
+/// How often the bytes of a file may be read into arrays: some writers let equal arrays share theirs, but what many share makes much
+/// of little.
+const MOST_USES: u64 = 8;
 
 /// The appended data of a file.
 #[derive(Debug)]
@@ -373,6 +382,13 @@ impl Contents<'_> {
         if blocks.packed.is_none() && total > blocks.body.length() {
             return Err(format!("the file ends after {} of its {total} bytes", blocks.body.length()).into());
         }
+        let own = blocks.packed.as_ref().map_or(total, |(_, starts)| starts.last().copied().unwrap_or_default());
+        let used = self.store.used.fetch_add(own, Relaxed).saturating_add(own);
+        if used > MOST_USES.saturating_mul(self.store.length) {
+            return Err(
+                format!("it shares its bytes with so many arrays that they hold {MOST_USES} times the file").into()
+            );
+        }
         Ok(())
     }
 }
@@ -400,10 +416,8 @@ impl Blocks {
         }
         let per_block = (self.size / kind.size()).max(1);
         let per_chunk = CHUNK / kind.size();
-        let scratch = || Scratch {
-            numbers: vec![0; per_block.min(per_chunk) * kind.size() / 8 + 1],
-            unpacker: Unpacker::default(),
-        };
+        let most = per_block.min(per_chunk).min(out.len() / size);
+        let scratch = || Scratch { numbers: vec![0; most * kind.size() / 8 + 1], unpacker: Unpacker::default() };
         out.par_chunks_mut(per_block * size).enumerate().try_for_each_init(scratch, |scratch, (block, out)| {
             let Scratch { numbers, unpacker } = scratch;
             if let Some((codec, starts)) = &self.packed {
@@ -437,7 +451,7 @@ impl Blocks {
 }
 
 /// Reverses the bytes of each number.
-fn reverse(bytes: &mut [u8], size: usize) {
+pub(super) fn reverse(bytes: &mut [u8], size: usize) {
     if size > 1 {
         bytes.chunks_exact_mut(size).for_each(<[u8]>::reverse);
     }

@@ -1,89 +1,236 @@
-//! Legacy .vtk files, read by vtkio.
+//! Legacy .vtk files, versions 1 to 5.1, ascii or binary (VTK File Formats, "Simple Legacy Formats").
+//!
+//! A file is a list of sections, each a keyword, a line that says what follows, and arrays. Nothing is skipped that has no name:
+//! what is not known is an error, as nobody could tell where it ends.
+
+mod scan;
 
 use super::vtu::renumber;
 use super::{refuse, validated};
 use crate::error::{Error, Result};
 use crate::mesh::{Array, Cells, Mesh, POLYHEDRON, Polyhedra, Values};
 use glam::DVec3;
+use scan::{Fault, Scanner, Type};
 use std::fs::File;
 use std::io::{Read, Seek};
-use std::panic::catch_unwind;
 use std::path::Path;
-use vtkio::model::{Attribute, CellType, DataSet, IOBuffer, Piece, UnstructuredGridPiece, VertexNumbers};
 
-/// Reads the unstructured grid in a legacy file, ascii or binary, versions 1 to 5.1.
-///
-/// vtkio does not read every array that VTK writes (NaN in ascii, ids, field data before the points): it then fails, or stops in
-/// the middle of the file. Either is an error here, so that no array is lost without a word.
+/// Reads the unstructured grid in a legacy file.
 pub(super) fn read(path: &Path, file: &mut File) -> Result<Mesh> {
     let mut bytes = Vec::new();
     file.rewind().and_then(|()| file.read_to_end(&mut bytes)).map_err(|e| Error::file(path, e))?;
-    // "# vtk DataFile Version 4.2": from 5.1 on Lagrange hexahedra are numbered as now.
-    let version = bytes.get(23..26).and_then(|v| std::str::from_utf8(v).ok()?.trim().parse().ok());
-    let old_numbering = version.is_some_and(|version: f64| version < 5.1);
-    skip_field_data(&mut bytes);
-    let bytes = rename_types(&bytes);
-    let help = "; a .vtu file of the same grid will do";
-    let parsed = catch_unwind(|| match vtkio::parser::parse_be(&bytes) {
-        Ok((rest, vtk)) => Some((rest.len(), vtk.data)),
-        Err(_) => None,
-    });
-    let Ok(Some((rest, data))) = parsed else {
-        return Err(Error::malformed(path, format!("vtkio cannot parse this legacy file{help}")));
+    let mut scanner = Scanner::new(&bytes);
+    // "# vtk DataFile Version 4.2", a title, and how it is written.
+    let version = scanner.line();
+    let version: f64 = version.rsplit(' ').next().and_then(|word| word.parse().ok()).unwrap_or(1.0);
+    scanner.line();
+    scanner.binary = match scanner.line().to_ascii_uppercase().as_str() {
+        "ASCII" => false,
+        "BINARY" => true,
+        other => {
+            let what = format!("its third line is \"{}\", not ASCII or BINARY", other.escape_debug());
+            return Err(Error::malformed(path, what));
+        }
     };
-    let piece = match data {
-        DataSet::UnstructuredGrid { pieces, .. } => pieces.into_iter().next(),
-        DataSet::ImageData { .. } => return Err(refuse(path, "ImageData")),
-        DataSet::StructuredGrid { .. } => return Err(refuse(path, "StructuredGrid")),
-        DataSet::RectilinearGrid { .. } => return Err(refuse(path, "RectilinearGrid")),
-        DataSet::PolyData { .. } => return Err(refuse(path, "PolyData")),
-        DataSet::Field { .. } => return Err(refuse(path, "FieldData")),
-    };
-    if rest > 0 {
-        let at = bytes.len() - rest;
-        let next: String = String::from_utf8_lossy(&bytes[at..bytes.len().min(at + 40)]).escape_debug().collect();
-        return Err(Error::unsupported(path, format!("vtkio stops at byte {at}, at \"{next}\"{help}")));
+    let kind = if scanner.pass("DATASET") { scanner.word("the kind of data set").ok() } else { None };
+    match kind.map(|kind| kind.to_ascii_uppercase()).as_deref() {
+        Some("UNSTRUCTURED_GRID") => {}
+        Some("STRUCTURED_POINTS") => return Err(refuse(path, "ImageData")),
+        Some("STRUCTURED_GRID") => return Err(refuse(path, "StructuredGrid")),
+        Some("RECTILINEAR_GRID") => return Err(refuse(path, "RectilinearGrid")),
+        Some("POLYDATA") => return Err(refuse(path, "PolyData")),
+        Some(other) => return Err(refuse(path, other)),
+        None => return Err(Error::malformed(path, "there is no data set in it")),
     }
-    let Some(Piece::Inline(piece)) = piece else { return Err(Error::malformed(path, "there is no grid in it")) };
-    mesh(path, *piece, old_numbering)
+    let mut parts = Parts::default();
+    while !scanner.is_at_end() {
+        let at = scanner.at();
+        let mut section = "a section".to_owned();
+        parts
+            .section(&mut scanner, &mut section)
+            .map_err(|what| Error::malformed(path, format!("{section}, at byte {at}: {what}")))?;
+    }
+    parts.mesh(path, version)
 }
 
-fn mesh(path: &Path, piece: UnstructuredGridPiece, old_numbering: bool) -> Result<Mesh> {
-    let fail = |what: &str| Error::malformed(path, what);
-    let coordinates = values(piece.points).ok_or_else(|| fail("the points are not numbers"))?;
-    let points =
-        (0..coordinates.len() / 3).map(|p| DVec3::from_array([0, 1, 2].map(|i| coordinates.get(3 * p + i)))).collect();
-    let types: Vec<u8> = piece.cells.types.iter().map(|kind: &CellType| *kind as u8).collect();
-    let (offsets, connectivity) = match piece.cells.cell_verts {
-        VertexNumbers::Legacy { vertices, .. } => {
-            let (mut offsets, mut connectivity, mut rest) = (vec![0], Vec::new(), &vertices[..]);
-            while let Some((count, after)) = rest.split_first() {
-                let cell = offsets.len() - 1;
-                let points = after.split_at_checked(*count as usize);
-                let (points, after) =
-                    points.ok_or_else(|| fail(&format!("cell {cell} has more points than CELLS lists")))?;
-                connectivity.extend_from_slice(points);
-                offsets.push(connectivity.len() as u64);
+/// What was read so far.
+#[derive(Default)]
+struct Parts {
+    points: Vec<DVec3>,
+    offsets: Vec<u64>,
+    connectivity: Vec<u32>,
+    types: Vec<u8>,
+    /// Of points and of cells.
+    arrays: [Vec<Array>; 2],
+    /// Which of these come now, and how many tuples they have.
+    current: Option<(usize, usize)>,
+}
+
+impl Parts {
+    /// Reads one section, and tells its name.
+    fn section(&mut self, from: &mut Scanner<'_>, section: &mut String) -> Result<(), Fault> {
+        let keyword = from.word("a keyword")?.to_ascii_uppercase();
+        *section = if keyword.chars().all(|c| c.is_ascii_graphic()) && keyword.len() < 40 {
+            keyword.clone()
+        } else {
+            "a section".into()
+        };
+        match keyword.as_str() {
+            "POINTS" => {
+                let count = from.count("the number of points")?;
+                let kind = Type::from_name(&from.word("their type")?, from.binary)?;
+                let values = from.values(kind, count.checked_mul(3))?.ok_or("they are strings")?;
+                let coordinate = |i| values.get(i);
+                self.points = (0..count).map(|p| DVec3::from_array([0, 1, 2].map(|i| coordinate(3 * p + i)))).collect();
+            }
+            "CELLS" => self.cells(from)?,
+            "CELL_TYPES" => {
+                let count = from.count("the number of cells")?;
+                from.enter_numbers();
+                let types = from.numbers::<i32>(count)?.into_iter().enumerate();
+                let narrow = |(c, kind)| u8::try_from(kind).map_err(|_| format!("the type of cell {c} is {kind}"));
+                self.types = types.map(narrow).collect::<Result<_, _>>()?;
+            }
+            "POINT_DATA" => self.current = Some((0, from.count("the number of points")?)),
+            "CELL_DATA" => self.current = Some((1, from.count("the number of cells")?)),
+            "FIELD" => {
+                let name = from.word("its name")?;
+                for _ in 0..from.count(&format!("the number of arrays of {name}"))? {
+                    self.field(from, section)?;
+                }
+            }
+            _ => self.attribute(from, &keyword, section)?,
+        }
+        from.pass_metadata();
+        Ok(())
+    }
+
+    /// Cells: the number of points of each, and these; from version 5 on where each ends, and all points.
+    fn cells(&mut self, from: &mut Scanner<'_>) -> Result<(), Fault> {
+        let (count, size) = (from.count("the number of cells")?, from.count("the size of the list")?);
+        if count == 0 {
+            return Ok(());
+        }
+        if !from.pass("OFFSETS") {
+            from.enter_numbers();
+            let list = from.numbers::<i32>(size)?;
+            let mut rest = &list[..];
+            self.offsets = vec![0];
+            while let Some((own, after)) = rest.split_first() {
+                let cell = self.offsets.len() - 1;
+                let own = usize::try_from(*own).ok().and_then(|own| after.split_at_checked(own));
+                let (points, after) = own.ok_or_else(|| format!("cell {cell} has more points than it lists"))?;
+                // What is negative is out of range in any case.
+                self.connectivity.extend(points.iter().map(|p| u32::try_from(*p).unwrap_or(u32::MAX)));
+                self.offsets.push(self.connectivity.len() as u64);
                 rest = after;
             }
-            (offsets, connectivity)
+            return Ok(());
         }
-        VertexNumbers::XML { connectivity, offsets } => {
-            // An index that does not fit is out of range in any case.
-            let narrow = |point: u64| u32::try_from(point).unwrap_or(u32::MAX);
-            (offsets, connectivity.into_iter().map(narrow).collect())
+        let list = |from: &mut Scanner<'_>, count| -> Result<Values, Fault> {
+            let kind = Type::from_name(&from.word("the type of the list")?, from.binary)?;
+            from.values(kind, Some(count))?.ok_or_else(|| "it is a list of strings".to_owned())
+        };
+        let offsets = list(from, count)?;
+        if !from.pass("CONNECTIVITY") {
+            return Err("no CONNECTIVITY follows".to_owned());
         }
-    };
-    let mut cells = Cells { types, offsets, connectivity };
-    let fits = cells.offsets.is_sorted() && cells.offsets.last() == Some(&(cells.connectivity.len() as u64));
-    if old_numbering && fits && cells.offsets.len() == cells.types.len() + 1 {
-        // VTK's reader takes Bézier hexahedra for such too.
-        renumber(&[72, 79], &cells.types, &cells.offsets[1..], &mut cells.connectivity);
+        let points = list(from, size)?;
+        // Exact to 2^53; what is negative is out of range, as is what is larger.
+        let index = |x: f64| if x < 0.0 { u64::MAX } else { x as u64 };
+        self.offsets = (0..offsets.len()).map(|i| index(offsets.get(i))).collect();
+        let point = |i| u32::try_from(index(points.get(i))).unwrap_or(u32::MAX);
+        self.connectivity = (0..points.len()).map(point).collect();
+        Ok(())
     }
-    let (cells, polyhedra) = unfold(cells)
-        .map_err(|c| fail(&format!("the faces of polyhedron {c} do not fit the numbers that CELLS lists for it")))?;
-    let mesh = Mesh::new(points, cells, arrays(piece.data.point), arrays(piece.data.cell));
-    validated(path, mesh.and_then(|mesh| if let Some(p) = polyhedra { mesh.with_polyhedra(p) } else { Ok(mesh) }))
+
+    /// One array of field data: its name, components, tuples and type. What comes before any point or cell data is of the file, and
+    /// left out.
+    fn field(&mut self, from: &mut Scanner<'_>, section: &mut String) -> Result<(), Fault> {
+        let name = from.word("the name of an array")?;
+        if name == "NULL_ARRAY" {
+            return Ok(());
+        }
+        *section = format!("array \"{}\"", name.escape_debug());
+        let (components, tuples) = (from.count("its number of components")?, from.count("its number of tuples")?);
+        let kind = Type::from_name(&from.word("its type")?, from.binary)?;
+        let values = from.values(kind, components.checked_mul(tuples))?;
+        self.keep(&name, components, values);
+        from.pass_metadata();
+        Ok(())
+    }
+
+    /// An array of points or cells that says by its keyword what it is for.
+    fn attribute(&mut self, from: &mut Scanner<'_>, keyword: &str, section: &mut String) -> Result<(), Fault> {
+        let fixed = match keyword {
+            "SCALARS" | "COLOR_SCALARS" | "TEXTURE_COORDINATES" | "LOOKUP_TABLE" => 0,
+            "GLOBAL_IDS" | "PEDIGREE_IDS" | "EDGE_FLAGS" => 1,
+            "VECTORS" | "NORMALS" | "TANGENTS" => 3,
+            "TENSORS6" => 6,
+            "TENSORS" => 9,
+            _ => return Err("Halite does not know such a section".to_owned()),
+        };
+        let name = from.word("its name")?;
+        *section = format!("array \"{}\"", name.escape_debug());
+        let colors = Type::from_name(if from.binary { "unsigned_char" } else { "float" }, from.binary)?;
+        if keyword == "LOOKUP_TABLE" {
+            let size = from.count("its size")?;
+            from.values(colors, size.checked_mul(4))?;
+            return Ok(());
+        }
+        let Some((_, tuples)) = self.current else { return Err("it comes before POINT_DATA or CELL_DATA".to_owned()) };
+        let (components, kind) = match keyword {
+            "COLOR_SCALARS" => (from.count("its number of components")?, colors),
+            "TEXTURE_COORDINATES" => {
+                let components = from.count("its number of components")?;
+                (components, Type::from_name(&from.word("its type")?, from.binary)?)
+            }
+            "SCALARS" => {
+                let kind = Type::from_name(&from.word("its type")?, from.binary)?;
+                // On the same line, or there is one; a table of colours may be named on the next.
+                (from.count_on_line().unwrap_or(1), kind)
+            }
+            _ => (fixed, Type::from_name(&from.word("its type")?, from.binary)?),
+        };
+        if keyword == "SCALARS" {
+            from.pass_table()?;
+        }
+        let mut values = from.values(kind, components.checked_mul(tuples))?;
+        if let ("COLOR_SCALARS", Some(Values::F32(shares))) = (keyword, &values) {
+            values = Some(Values::U8(shares.iter().map(|share| (share * 255.0).round() as u8).collect()));
+        }
+        self.keep(&name, components, values);
+        Ok(())
+    }
+
+    fn keep(&mut self, name: &str, components: usize, values: Option<Values>) {
+        match (values, self.current) {
+            (Some(values), Some((of, _))) if components > 0 => {
+                self.arrays[of].push(Array { name: decoded(name), components, values });
+            }
+            (None, Some(_)) => tracing::warn!("array \"{name}\" is left out: it is of strings"),
+            _ => {}
+        }
+    }
+
+    fn mesh(self, path: &Path, version: f64) -> Result<Mesh> {
+        let Parts { points, mut offsets, mut connectivity, types, arrays: [of_points, of_cells], .. } = self;
+        if offsets.is_empty() {
+            offsets.push(0);
+        }
+        let fits = offsets.is_sorted() && offsets.last() == Some(&(connectivity.len() as u64));
+        if version < 5.1 && fits && offsets.len() == types.len() + 1 {
+            // From 5.1 on Lagrange hexahedra are numbered as now. VTK's reader takes Bézier hexahedra for such too.
+            renumber(&[72, 79], &types, &offsets[1..], &mut connectivity);
+        }
+        let cells = Cells { types, offsets, connectivity };
+        let (cells, polyhedra) = unfold(cells).map_err(|c| {
+            let what = format!("the faces of polyhedron {c} do not fit the numbers that CELLS lists for it");
+            Error::malformed(path, what)
+        })?;
+        let mesh = Mesh::new(points, cells, of_points, of_cells);
+        validated(path, mesh.and_then(|mesh| if let Some(p) = polyhedra { mesh.with_polyhedra(p) } else { Ok(mesh) }))
+    }
 }
 
 /// In these files a polyhedron has no points, but its faces: their number, and for each the number of its points, and these. Takes
@@ -115,134 +262,6 @@ fn unfold(cells: Cells) -> Result<(Cells, Option<Polyhedra>), usize> {
         polyhedra.cells.push(polyhedra.faces.len() as u64 - 1);
     }
     Ok((Cells { types: cells.types, offsets, connectivity }, Some(polyhedra)))
-}
-
-/// Gives number types the names by which vtkio knows them, in the lines that announce arrays.
-fn rename_types(bytes: &[u8]) -> Vec<u8> {
-    let names: [(&[u8], &[u8]); 3] =
-        [(b" vtktypeint64", b" long"), (b" vtktypeuint64", b" unsigned_long"), (b" signed_char", b" char")];
-    let mut out = Vec::with_capacity(bytes.len());
-    for (i, line) in bytes.split(|b| *b == b'\n').enumerate() {
-        if i > 0 {
-            out.push(b'\n');
-        }
-        let announces = line.len() < 1000 && line.iter().all(|b| b.is_ascii_graphic() || *b == b' ' || *b == b'\r');
-        let words = line.split(|b| *b == b' ').take(4).count();
-        // The cells' own lines have two words, and vtkio knows their types.
-        let renamed = |(from, to): &(&'static [u8], &'static [u8])| {
-            let at = line.windows(from.len()).position(|w| w == *from)?;
-            Some([&line[..at], *to, &line[at + from.len()..]])
-        };
-        let found = if announces && words >= 3 { names.iter().find_map(renamed) } else { None };
-        match found {
-            Some(parts) => parts.iter().for_each(|part| out.extend_from_slice(part)),
-            None => out.extend_from_slice(line),
-        }
-    }
-    out
-}
-
-/// Takes out the field data between DATASET and POINTS, such as the time of a step, which vtkio does not expect there. Leaves
-/// what does not look like that.
-fn skip_field_data(bytes: &mut Vec<u8>) {
-    let line = |at: usize| {
-        let end = bytes[at..].iter().position(|b| *b == b'\n').map_or(bytes.len(), |n| at + n);
-        (String::from_utf8_lossy(&bytes[at..end]).into_owned(), (end + 1).min(bytes.len()))
-    };
-    let (mut at, mut lines) = (0, Vec::new());
-    for _ in 0..4 {
-        let (text, next) = line(at);
-        lines.push(text);
-        at = next;
-    }
-    let (binary, start) = (lines[2].trim().eq_ignore_ascii_case("BINARY"), at);
-    let (field, mut at) = line(at);
-    let words: Vec<&str> = field.split_whitespace().collect();
-    let (["FIELD", _, count], true) = (&words[..], lines[3].starts_with("DATASET")) else { return };
-    for _ in 0..count.parse().unwrap_or(0_usize) {
-        let (mut text, mut next) = line(at);
-        while text.trim().is_empty() && next > at {
-            at = next;
-            (text, next) = line(at);
-        }
-        let words: Vec<&str> = text.split_whitespace().collect();
-        let [_, components, tuples, kind] = words[..] else { return };
-        let (Ok(components), Ok(tuples)) = (components.parse::<usize>(), tuples.parse::<usize>()) else { return };
-        let Some(numbers) = components.checked_mul(tuples) else { return };
-        let size = match kind {
-            "char" | "unsigned_char" | "signed_char" => 1,
-            "short" | "unsigned_short" => 2,
-            "int" | "unsigned_int" | "float" | "vtkIdType" => 4,
-            "long" | "unsigned_long" | "double" | "vtktypeint64" | "vtktypeuint64" => 8,
-            // Of strings, each takes a line in ascii.
-            "string" if !binary => 0,
-            _ => return,
-        };
-        at = next;
-        if size == 0 {
-            for _ in 0..numbers.min(bytes.len()) {
-                at = line(at).1;
-            }
-        } else if binary {
-            let Some(end) = numbers.checked_mul(size).and_then(|n| at.checked_add(n)).filter(|end| *end <= bytes.len())
-            else {
-                return;
-            };
-            at = end;
-        } else {
-            for _ in 0..numbers {
-                if at == bytes.len() {
-                    return;
-                }
-                at += bytes[at..].iter().take_while(|b| b.is_ascii_whitespace()).count();
-                at += bytes[at..].iter().take_while(|b| !b.is_ascii_whitespace()).count();
-            }
-        }
-    }
-    // Up to the next keyword; a description of the arrays may be in between.
-    if let Some(points) = bytes[at - 1..].windows(7).position(|w| w.eq_ignore_ascii_case(b"\nPOINTS")) {
-        let points = at - 1 + points;
-        let between = String::from_utf8_lossy(&bytes[at..points.max(at)]).into_owned();
-        if between.trim().is_empty() || between.trim_start().starts_with("METADATA") {
-            bytes.drain(start..=points);
-        }
-    }
-}
-
-fn arrays(attributes: Vec<Attribute>) -> Vec<Array> {
-    let mut arrays = Vec::new();
-    let mut add = |name: &str, components: u32, data: IOBuffer| match values(data) {
-        Some(values) => arrays.push(Array { name: decoded(name), components: components as usize, values }),
-        None => tracing::warn!("array \"{name}\" is left out: its type is bit"),
-    };
-    for attribute in attributes {
-        match attribute {
-            Attribute::DataArray(array) if array.elem != vtkio::model::ElementType::LookupTable => {
-                add(&array.name, array.elem.num_comp(), array.data);
-            }
-            Attribute::DataArray(_) => {}
-            Attribute::Field { data_array, .. } => {
-                data_array.into_iter().for_each(|array| add(&array.name, array.elem, array.data));
-            }
-        }
-    }
-    arrays
-}
-
-fn values(data: IOBuffer) -> Option<Values> {
-    Some(match data {
-        IOBuffer::Bit(_) => return None,
-        IOBuffer::I8(v) => Values::I8(v),
-        IOBuffer::U8(v) => Values::U8(v),
-        IOBuffer::I16(v) => Values::I16(v),
-        IOBuffer::U16(v) => Values::U16(v),
-        IOBuffer::I32(v) => Values::I32(v),
-        IOBuffer::U32(v) => Values::U32(v),
-        IOBuffer::I64(v) => Values::I64(v),
-        IOBuffer::U64(v) => Values::U64(v),
-        IOBuffer::F32(v) => Values::F32(v),
-        IOBuffer::F64(v) => Values::F64(v),
-    })
 }
 
 /// VTK writes the spaces and other odd characters of a name as `%20`.

@@ -11,10 +11,11 @@ use quick_xml::events::{BytesStart, Event};
 use rayon::prelude::*;
 use std::collections::{BTreeSet, HashMap};
 use std::fs::File;
-use std::io::{BufRead, BufReader, Seek};
+use std::io::{BufRead, BufReader, Read, Seek};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
+use std::sync::atomic::AtomicU64;
 
 /// Reads the unstructured grid in a VTK XML file, or in the files that it lists.
 pub(super) fn read(path: &Path, tell: &(dyn Fn(f64) + Sync)) -> Result<Mesh> {
@@ -142,8 +143,15 @@ impl Head {
     fn read(path: &Path) -> Result<Self> {
         let file = File::open(path).map_err(|e| Error::file(path, e))?;
         let length = file.metadata().map_err(|e| Error::file(path, e))?.len();
-        let store =
-            Store { path: path.to_owned(), length, big_endian: false, word: 4, compressor: None, appended: None };
+        let store = Store {
+            path: path.to_owned(),
+            length,
+            big_endian: false,
+            word: 4,
+            compressor: None,
+            appended: None,
+            used: AtomicU64::new(0),
+        };
         let mut head = Head {
             store,
             pieces: Vec::new(),
@@ -152,17 +160,19 @@ impl Head {
             sources: Vec::new(),
             old_numbering: false,
         };
-        let mut reader = Reader::from_reader(BufReader::with_capacity(1 << 18, file));
+        let inner = BufReader::with_capacity((length as usize).clamp(1 << 10, 1 << 18), file);
+        let mut reader = Reader::from_reader(Limited { inner, left: MOST_OF_A_TAG });
         let mut buffer = Vec::new();
         loop {
             buffer.clear();
+            reader.get_mut().left = MOST_OF_A_TAG;
             let event = reader.read_event_into(&mut buffer).map_err(|e| head.malformed(format!("XML: {e}")))?;
             match event {
                 Event::Start(tag)
                     if tag.name().as_ref() == "AppendedData" && head.open.last() == Some(&Element::File) =>
                 {
                     let base64 = head.attribute(&tag, "encoding")?.as_deref() != Some("raw");
-                    let start = underscore(reader.get_mut()).map_err(|e| Error::file(path, e))?;
+                    let start = underscore(&mut reader.get_mut().inner).map_err(|e| Error::file(path, e))?;
                     let start =
                         start.ok_or_else(|| head.malformed("<AppendedData> does not start with an underscore"))?;
                     head.store.appended = Some(Appended { start, base64 });
@@ -182,7 +192,7 @@ impl Head {
                 Event::Eof => return Err(head.malformed("the file ends before its XML does: it was cut short")),
                 _ => {}
             }
-            let text = skip_text(reader.get_mut()).map_err(|e| Error::file(path, e))?;
+            let text = skip_text(&mut reader.get_mut().inner).map_err(|e| Error::file(path, e))?;
             if let Some(Element::Array(section)) = head.open.last() {
                 head.add_text(*section, text);
             }
@@ -264,7 +274,7 @@ impl Head {
         let fail =
             |what: String| self.malformed(format!("{} array \"{}\": {what}", section.name(), name.escape_debug()));
         let kind = self.attribute(tag, "type")?.unwrap_or_default();
-        if kind == "String" || kind == "Bit" {
+        if kind == "String" {
             tracing::warn!(
                 "{}: {} array \"{name}\" is left out: its type is {kind}",
                 self.store.path.display(),
@@ -272,7 +282,9 @@ impl Head {
             );
             return Ok(Element::Other);
         }
-        let kind = Kind::from_name(&kind).ok_or_else(|| fail(format!("its type is \"{}\"", kind.escape_debug())))?;
+        let bits = kind == "Bit";
+        let kind = Kind::from_name(if bits { "UInt8" } else { &kind })
+            .ok_or_else(|| fail(format!("its type is \"{}\"", kind.escape_debug())))?;
         let components = match self.attribute(tag, "NumberOfComponents")?.filter(|text| !text.is_empty()) {
             Some(text) => {
                 let components = text.trim().parse::<u32>();
@@ -294,7 +306,10 @@ impl Head {
             Some(other) => return Err(fail(format!("its format is \"{}\"", other.escape_debug()))),
         };
         if let Some(piece) = self.pieces.len().checked_sub(1) {
-            let array = DataArray { section: section.name(), piece, name, kind, components: components as usize, data };
+            // In text each has a number of its own.
+            let bits = bits && !matches!(data, Data::Ascii(_));
+            let components = components as usize;
+            let array = DataArray { section: section.name(), piece, name, kind, bits, components, data };
             self.pieces[piece].arrays[section as usize].push(array);
         }
         Ok(Element::Array(section))
@@ -322,6 +337,40 @@ impl Head {
             Ok(value) => value.into_owned(),
             Err(_) => found.value.into_owned(),
         }))
+    }
+}
+
+/// Bytes that a tag or comment may have. It is kept in memory as a whole: without its end, that would be the rest of the file.
+const MOST_OF_A_TAG: usize = 1 << 16;
+
+/// A file of which so many bytes may be taken.
+struct Limited {
+    inner: BufReader<File>,
+    left: usize,
+}
+
+impl Read for Limited {
+    fn read(&mut self, out: &mut [u8]) -> std::io::Result<usize> {
+        let found = self.fill_buf()?;
+        let n = found.len().min(out.len());
+        out[..n].copy_from_slice(&found[..n]);
+        self.consume(n);
+        Ok(n)
+    }
+}
+
+impl BufRead for Limited {
+    fn fill_buf(&mut self) -> std::io::Result<&[u8]> {
+        if self.left == 0 {
+            return Err(std::io::Error::other(format!("a tag has more than {MOST_OF_A_TAG} bytes")));
+        }
+        let found = self.inner.fill_buf()?;
+        Ok(&found[..found.len().min(self.left)])
+    }
+
+    fn consume(&mut self, bytes: usize) {
+        self.left = self.left.saturating_sub(bytes);
+        self.inner.consume(bytes);
     }
 }
 
@@ -511,6 +560,12 @@ impl Grid<'_> {
                     };
                     let from = if *face == 0 { 0 } else { ends[*face as usize - 1] };
                     polyhedra.points.extend_from_slice(&points[from as usize..*end as usize]);
+                    // A face has two sides: what is named far more often makes much of little.
+                    if polyhedra.points.len() > 8 * points.len() {
+                        let what =
+                            format!("by polyhedron {cell} its faces are named 8 times each, but a face has two sides");
+                        return Err(self.malformed(piece, what));
+                    }
                     polyhedra.faces.push(polyhedra.points.len() as u64);
                 }
                 start = *end;
@@ -598,6 +653,20 @@ impl Grid<'_> {
         })
     }
 
+    /// Reads bits, the highest of a byte first, as 0 and 1; numbers of another type as what a byte holds of them.
+    fn bits(&self, piece: &Piece, array: &DataArray, tuples: u64) -> Result<Vec<u8>> {
+        if !array.bits {
+            return Ok(self.floats(piece, array, tuples)?.into_iter().map(|x| x as u8).collect());
+        }
+        let count = tuples.saturating_mul(array.components as u64);
+        let bytes: Vec<u8> =
+            self.store(piece).array(array)?.read(count.div_ceil(8), &self.progress, &|_, numbers, out| {
+                out.copy_from_slice(numbers);
+                Ok(())
+            })?;
+        Ok((0..count as usize).map(|i| bytes[i / 8] >> (7 - i % 8) & 1).collect::<Vec<u8>>())
+    }
+
     /// The arrays of point or cell data that all pieces have, pieces with no points (or cells) aside.
     fn data(&self, section: Section) -> Result<Vec<Array>> {
         let filled: Vec<&Piece> = self.pieces.iter().filter(|piece| piece.tuples(section) > 0).collect();
@@ -632,7 +701,10 @@ impl Grid<'_> {
         let Some((_, first)) = parts.first() else {
             return Err(Error::malformed(self.path, "no piece has arrays"));
         };
-        let values = if parts.iter().all(|(_, part)| part.kind == first.kind) {
+        let values = if parts.iter().any(|(_, part)| part.bits) {
+            let bits = parts.iter().map(|(piece, part)| self.bits(piece, part, piece.tuples(section)));
+            u8::values(joined(bits.collect::<Result<Vec<_>>>()?))
+        } else if parts.iter().all(|(_, part)| part.kind == first.kind) {
             with_kind!(first.kind, T => {
                 let read = |(piece, part): &(&Piece, &DataArray)| {
                     let count = piece.tuples(section).saturating_mul(part.components as u64);

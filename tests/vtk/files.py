@@ -4,11 +4,13 @@ Needs VTK 9 and nothing else. A dump is one file: lines of text, each followed b
 import os, sys
 import vtk
 
-SIZES = {2: "i1", 15: "i1", 3: "u1", 4: "i2", 5: "u2", 6: "i4", 7: "u4", 8: "i8", 9: "u8", 10: "f4", 11: "f8", 12: "i8", 16: "i8", 17: "u8"}
+SIZES = {1: "u1", 2: "i1", 15: "i1", 3: "u1", 4: "i2", 5: "u2", 6: "i4", 7: "u4", 8: "i8", 9: "u8", 10: "f4", 11: "f8", 12: "i8", 16: "i8", 17: "u8"}
 
 
 def numbers(array):
     """Kind and bytes of an array."""
+    if array.GetDataType() == 1:
+        return "u1", bytes(array.GetValue(i) for i in range(array.GetNumberOfValues()))
     kind = SIZES[array.GetDataType()]
     if kind[0] != "f" and int(kind[1]) != array.GetDataTypeSize():
         kind = kind[0] + str(array.GetDataTypeSize())
@@ -118,6 +120,23 @@ def grid_of(kinds, polyhedra=False):
             for i in range(array.GetNumberOfValues()):
                 array.SetValue(i, (i * 37 % 101) + (0.1 if name in ("Float", "Double") else 0))
             data.AddArray(array)
+        bits, words, ids, odd = vtk.vtkBitArray(), vtk.vtkStringArray(), vtk.vtkIdTypeArray(), vtk.vtkFloatArray()
+        for array, name in ((bits, "Bit"), (words, "String"), (ids, "Ids"), (odd, "Odd")):
+            array.SetName(name)
+            for i in range(count):
+                value = {"Bit": i * i % 3, "String": f"a b{i}", "Ids": 3 * i, "Odd": [float("nan"), 1, float("inf")][i % 3]}[name]
+                array.InsertNextValue(value)
+            if name == "Ids":
+                data.SetGlobalIds(array)
+            else:
+                data.AddArray(array)
+        tensors = vtk.vtkDoubleArray()
+        tensors.SetName("Tensors6")
+        tensors.SetNumberOfComponents(6)
+        tensors.SetNumberOfTuples(count)
+        for i in range(6 * count):
+            tensors.SetValue(i, i)
+        data.SetTensors(tensors)
     return grid
 
 
@@ -145,9 +164,6 @@ def write(folder):
                     (writer.SetByteOrderToBigEndian if big else writer.SetByteOrderToLittleEndian)()
                     (writer.SetHeaderTypeToUInt64 if big else writer.SetHeaderTypeToUInt32)()
                     writer.Write()
-        # The vtkio crate, which reads these files, does not know unsigned shorts, and says so.
-        grid.GetPointData().RemoveArray("UnsignedShort")
-        grid.GetCellData().RemoveArray("UnsignedShort")
         for version in (42, 51):
             for binary in (0, 1):
                 writer = vtk.vtkUnstructuredGridWriter()

@@ -75,7 +75,12 @@ pub(crate) fn scalars(mesh: &Mesh, of: Option<Association>) -> Result<Scalars> {
         (is_id(&a.name), !varies(a), integer, *association == Association::Cell, a.components > 1)
     });
     let Some((association, array)) = best else {
-        bail!("the mesh has no array of values to draw");
+        let of = match of {
+            Some(Association::Point) => "points",
+            Some(Association::Cell) => "cells",
+            None => "points or cells",
+        };
+        bail!("it has no array of {of}, so no values to draw");
     };
     let component = if array.components > 1 { Component::Magnitude } else { Component::Index(0) };
     Ok(Scalars { name: array.name.clone(), association: Some(association), component: Some(component) })

@@ -230,7 +230,7 @@ impl Request {
         let mut scalars = match (&self.scalars, scene) {
             (Some(name), _) => Scalars { name: name.clone(), association: None, component: None },
             (None, Some(scene)) => scene.scalars.clone(),
-            (None, None) => choose::scalars(mesh, association)?,
+            (None, None) => choose::scalars(mesh, association).with_context(|| self.input.display().to_string())?,
         };
         scalars.association = association.or(scalars.association);
         scalars.component = self.component.or(scalars.component);

@@ -1,0 +1,228 @@
+//! The words and arrays of a legacy file, one after another: text or binary, as its third line says.
+
+use crate::io::data::reverse;
+use crate::io::number::{Kind, Number, with_kind};
+use crate::mesh::Values;
+
+/// Why a file cannot be read; the place is added to it.
+pub(super) type Fault = String;
+
+/// A place in a legacy file.
+pub(super) struct Scanner<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    pub(super) binary: bool,
+}
+
+/// What an array is made of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Type {
+    Numbers {
+        /// As the file holds them.
+        stored: Kind,
+        /// As they are kept.
+        kept: Kind,
+    },
+    Bits,
+    Strings,
+}
+
+impl Type {
+    /// The type of that name, which is told by VTK's writer. Ids have 64 bits, of which binary files hold 32.
+    pub(super) fn from_name(name: &str, binary: bool) -> Result<Type, Fault> {
+        let kind = match name.to_ascii_lowercase().as_str() {
+            "char" | "signed_char" | "vtktypeint8" => Kind::I8,
+            "unsigned_char" | "vtktypeuint8" => Kind::U8,
+            "short" | "vtktypeint16" => Kind::I16,
+            "unsigned_short" | "vtktypeuint16" => Kind::U16,
+            "int" | "vtktypeint32" => Kind::I32,
+            "unsigned_int" | "vtktypeuint32" => Kind::U32,
+            "long" | "vtktypeint64" => Kind::I64,
+            "unsigned_long" | "vtktypeuint64" => Kind::U64,
+            "float" | "vtktypefloat32" => Kind::F32,
+            "double" | "vtktypefloat64" => Kind::F64,
+            "vtkidtype" => {
+                return Ok(Type::Numbers { stored: if binary { Kind::I32 } else { Kind::I64 }, kept: Kind::I64 });
+            }
+            "bit" => return Ok(Type::Bits),
+            "string" => return Ok(Type::Strings),
+            _ => return Err(format!("there is no number type \"{}\"", name.escape_debug())),
+        };
+        Ok(Type::Numbers { stored: kind, kept: kind })
+    }
+}
+
+impl<'a> Scanner<'a> {
+    pub(super) fn new(bytes: &'a [u8]) -> Self {
+        Scanner { bytes, at: 0, binary: false }
+    }
+
+    /// Bytes from the start of the file.
+    pub(super) fn at(&self) -> usize {
+        self.at
+    }
+
+    fn rest(&self) -> &'a [u8] {
+        &self.bytes[self.at..]
+    }
+
+    fn skip_blanks(&mut self) {
+        self.at += self.rest().iter().take_while(|b| b.is_ascii_whitespace()).count();
+    }
+
+    /// The next word; none at the end of the file.
+    fn bytes_of_word(&mut self) -> Option<&'a [u8]> {
+        self.skip_blanks();
+        let word = &self.rest()[..self.rest().iter().take_while(|b| !b.is_ascii_whitespace()).count()];
+        self.at += word.len();
+        (!word.is_empty()).then_some(word)
+    }
+
+    /// The next word, which must be there.
+    pub(super) fn word(&mut self, what: &str) -> Result<String, Fault> {
+        let word = self.bytes_of_word().ok_or_else(|| format!("the file ends before {what}"))?;
+        Ok(String::from_utf8_lossy(word).into_owned())
+    }
+
+    /// Passes the next word if it is `keyword`, and says so.
+    pub(super) fn pass(&mut self, keyword: &str) -> bool {
+        let start = self.at + self.rest().iter().take_while(|b| b.is_ascii_whitespace()).count();
+        let end = start + keyword.len();
+        let found = self.bytes.get(start..end).is_some_and(|word| word.eq_ignore_ascii_case(keyword.as_bytes()))
+            && self.bytes.get(end).is_none_or(u8::is_ascii_whitespace);
+        if found {
+            self.at = end;
+        }
+        found
+    }
+
+    pub(super) fn count(&mut self, what: &str) -> Result<usize, Fault> {
+        let word = self.word(what)?;
+        word.parse().map_err(|_| format!("{what} is \"{}\", not a count", word.escape_debug()))
+    }
+
+    /// A count on this line, if there is one.
+    pub(super) fn count_on_line(&mut self) -> Option<usize> {
+        let before = self.at;
+        let line = self.line();
+        self.at = before;
+        line.split_whitespace().next()?.parse().ok()
+    }
+
+    /// What is left of the line. The scanner goes to the start of the next one.
+    pub(super) fn line(&mut self) -> String {
+        let end = self.rest().iter().position(|b| *b == b'\n');
+        let line = &self.rest()[..end.unwrap_or(self.rest().len())];
+        self.at += end.map_or(line.len(), |end| end + 1);
+        String::from_utf8_lossy(line).trim().to_owned()
+    }
+
+    pub(super) fn is_at_end(&mut self) -> bool {
+        self.skip_blanks();
+        self.rest().is_empty()
+    }
+
+    /// Passes a description of the array before, if there is one: it ends with an empty line.
+    pub(super) fn pass_metadata(&mut self) {
+        while self.pass("METADATA") {
+            self.line();
+            while !self.line().is_empty() {}
+        }
+    }
+
+    /// Reads as many values, which start on the next line if they are no text; none if they are strings.
+    pub(super) fn values(&mut self, what: Type, count: Option<usize>) -> Result<Option<Values>, Fault> {
+        let count = count.ok_or("there are more values than any file can hold")?;
+        if what == Type::Strings {
+            self.line();
+        } else {
+            self.enter_numbers();
+        }
+        Ok(match what {
+            Type::Numbers { stored, kept } if stored == kept => {
+                Some(with_kind!(kept, T => T::values(self.numbers::<T>(count)?)))
+            }
+            Type::Numbers { .. } => Some(Values::I64(self.numbers::<i32>(count)?.into_iter().map(i64::from).collect())),
+            Type::Bits if self.binary => {
+                let bytes = self.take(count.div_ceil(8))?;
+                Some(Values::U8((0..count).map(|i| bytes[i / 8] >> (7 - i % 8) & 1).collect()))
+            }
+            Type::Bits => Some(Values::U8(self.numbers(count)?)),
+            Type::Strings => {
+                for _ in 0..count {
+                    self.string()?;
+                }
+                None
+            }
+        })
+    }
+
+    /// Passes a string: in text a line, else bytes after their number, of which the first two bits say how long it is itself.
+    fn string(&mut self) -> Result<(), Fault> {
+        if self.rest().is_empty() {
+            return Err("the file ends inside the array".to_owned());
+        }
+        if self.binary {
+            let size = [8, 4, 2, 1][usize::from(self.bytes[self.at] >> 6)];
+            let head = self.take(size)?;
+            let length =
+                head.iter().fold(0u64, |n, byte| n << 8 | u64::from(*byte)) & (u64::MAX >> (66 - 8 * size as u32));
+            self.take(usize::try_from(length).unwrap_or(usize::MAX))?;
+        } else {
+            self.line();
+        }
+        Ok(())
+    }
+
+    /// Goes to where numbers start: the next line if they are no text.
+    pub(super) fn enter_numbers(&mut self) {
+        if self.binary {
+            self.line();
+        }
+    }
+
+    /// Passes the rest of the line of scalars, and the name of their table of colours if it follows.
+    pub(super) fn pass_table(&mut self) -> Result<(), Fault> {
+        let before = self.at;
+        self.line();
+        if self.pass("LOOKUP_TABLE") {
+            self.word("the name of a table").map(drop)
+        } else {
+            self.at = before;
+            self.count_on_line().map_or(Ok(()), |_| self.word("the number of components").map(drop))
+        }
+    }
+
+    fn take(&mut self, bytes: usize) -> Result<&'a [u8], Fault> {
+        let taken = self.rest().get(..bytes);
+        let taken = taken.ok_or_else(|| format!("the file ends after {} of its {bytes} bytes", self.rest().len()))?;
+        self.at += bytes;
+        Ok(taken)
+    }
+
+    /// The next numbers. Those of binary files have their highest byte first.
+    pub(super) fn numbers<T: Number>(&mut self, count: usize) -> Result<Vec<T>, Fault> {
+        if self.binary {
+            let bytes = self.take(count.saturating_mul(size_of::<T>()))?;
+            let mut numbers = vec![T::zeroed(); count];
+            let own = bytemuck::cast_slice_mut(&mut numbers);
+            own.copy_from_slice(bytes);
+            if cfg!(target_endian = "little") {
+                reverse(own, size_of::<T>());
+            }
+            return Ok(numbers);
+        }
+        // Each takes two bytes at least: what the file says is not taken for it.
+        let mut numbers = Vec::with_capacity(count.min(self.rest().len() / 2 + 1));
+        while numbers.len() < count {
+            let token = self.bytes_of_word();
+            let token = token.ok_or_else(|| format!("it holds {} numbers, not {count}", numbers.len()))?;
+            let number = std::str::from_utf8(token).ok().and_then(T::parse).ok_or_else(|| {
+                let token = String::from_utf8_lossy(&token[..token.len().min(40)]);
+                format!("\"{}\" is not a number of its type", token.escape_debug())
+            });
+            numbers.push(number?);
+        }
+        Ok(numbers)
+    }
+}
