@@ -3,11 +3,11 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use glam::{DVec3, dvec3};
+use halite::geometry::Geometry;
+use halite::geometry::contacts::Contacts;
 use halite::mesh::cells::Tetrahedra;
 use halite::mesh::faces::Faces;
 use halite::mesh::{Cells, Mesh, generate};
-use halite::traverse::Geometry;
-use halite::traverse::contacts::Contacts;
 
 /// Faces looked at, touching ones, those in other cells.
 fn contacts(mesh: &Mesh) -> [usize; 3] {

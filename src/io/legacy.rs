@@ -1,8 +1,10 @@
 //! Legacy .vtk files, versions 1 to 5.1, ascii or binary (VTK File Formats, "Simple Legacy Formats").
 //!
-//! A file is a list of sections, each a keyword, a line that says what follows, and arrays. Nothing is skipped that has no name:
-//! what is not known is an error, as nobody could tell where it ends.
+//! vtkio parses them (`parsed`). What it cannot, or would lose, is scanned here: a file is a list of sections, each a keyword, a line
+//! that says what follows, and arrays. Nothing is skipped that has no name: what is not known is an error, as nobody could tell
+//! where it ends.
 
+mod parsed;
 mod scan;
 
 use super::vtu::renumber;
@@ -41,6 +43,9 @@ pub(super) fn read(path: &Path, file: &mut File) -> Result<Mesh> {
         Some("POLYDATA") => return Err(refuse(path, "PolyData")),
         Some(other) => return Err(refuse(path, other)),
         None => return Err(Error::malformed(path, "there is no data set in it")),
+    }
+    if let Some(parts) = Parts::parsed(&bytes) {
+        return parts.mesh(path, version);
     }
     let mut parts = Parts::default();
     while !scanner.is_at_end() {
@@ -114,17 +119,9 @@ impl Parts {
         if !from.pass("OFFSETS") {
             from.enter_numbers();
             let list = from.numbers::<i32>(size)?;
-            let mut rest = &list[..];
-            self.offsets = vec![0];
-            while let Some((own, after)) = rest.split_first() {
-                let cell = self.offsets.len() - 1;
-                let own = usize::try_from(*own).ok().and_then(|own| after.split_at_checked(own));
-                let (points, after) = own.ok_or_else(|| format!("cell {cell} has more points than it lists"))?;
-                // What is negative is out of range in any case.
-                self.connectivity.extend(points.iter().map(|p| u32::try_from(*p).unwrap_or(u32::MAX)));
-                self.offsets.push(self.connectivity.len() as u64);
-                rest = after;
-            }
+            // What is negative is out of range in any case.
+            let list: Vec<u32> = list.into_iter().map(|n| u32::try_from(n).unwrap_or(u32::MAX)).collect();
+            self.unpack(&list)?;
             return Ok(());
         }
         let list = |from: &mut Scanner<'_>, count| -> Result<Values, Fault> {
@@ -141,6 +138,22 @@ impl Parts {
         self.offsets = (0..offsets.len()).map(|i| index(offsets.get(i))).collect();
         let point = |i| u32::try_from(index(points.get(i))).unwrap_or(u32::MAX);
         self.connectivity = (0..points.len()).map(point).collect();
+        Ok(())
+    }
+
+    /// Takes apart a list of cells: the number of points of each, and these.
+    fn unpack(&mut self, list: &[u32]) -> Result<(), Fault> {
+        let mut rest = list;
+        self.offsets = vec![0];
+        while let Some((own, after)) = rest.split_first() {
+            let cell = self.offsets.len() - 1;
+            let (points, after) = after
+                .split_at_checked(*own as usize)
+                .ok_or_else(|| format!("cell {cell} has more points than it lists"))?;
+            self.connectivity.extend_from_slice(points);
+            self.offsets.push(self.connectivity.len() as u64);
+            rest = after;
+        }
         Ok(())
     }
 

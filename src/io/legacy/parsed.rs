@@ -1,0 +1,69 @@
+//! What vtkio parses of a legacy file.
+
+use super::{Parts, decoded};
+use crate::mesh::{Array, Values};
+use glam::DVec3;
+use std::panic::catch_unwind;
+use vtkio::model::{Attribute, CellType, DataSet, ElementType, IOBuffer, Piece, VertexNumbers};
+
+impl Parts {
+    /// The grid in `bytes`, if vtkio parses all of it and keeps each array. It panics on some input, and stops without a word before
+    /// what it does not know: NaN in text, ids, types that are not C's, field data before the points.
+    pub(super) fn parsed(bytes: &[u8]) -> Option<Self> {
+        let (rest, vtk) = catch_unwind(|| vtkio::parser::parse_be(bytes).ok()).ok().flatten()?;
+        if !rest.is_empty() {
+            return None;
+        }
+        let DataSet::UnstructuredGrid { pieces, .. } = vtk.data else { return None };
+        let Some(Piece::Inline(piece)) = pieces.into_iter().next() else { return None };
+        let coordinates = values(piece.points)?;
+        let point = |p: usize| DVec3::from_array([0, 1, 2].map(|i| coordinates.get(3 * p + i)));
+        let mut parts = Parts {
+            points: (0..coordinates.len() / 3).map(point).collect(),
+            types: piece.cells.types.iter().map(|kind: &CellType| *kind as u8).collect(),
+            arrays: [arrays(piece.data.point)?, arrays(piece.data.cell)?],
+            ..Parts::default()
+        };
+        match piece.cells.cell_verts {
+            VertexNumbers::Legacy { vertices, .. } => parts.unpack(&vertices).ok()?,
+            VertexNumbers::XML { connectivity, offsets } => {
+                // An index that does not fit is out of range in any case.
+                let narrow = |point: u64| u32::try_from(point).unwrap_or(u32::MAX);
+                (parts.offsets, parts.connectivity) = (offsets, connectivity.into_iter().map(narrow).collect());
+            }
+        }
+        Some(parts)
+    }
+}
+
+/// None if one would be lost.
+fn arrays(attributes: Vec<Attribute>) -> Option<Vec<Array>> {
+    let mut arrays = Vec::new();
+    for attribute in attributes {
+        let found = match attribute {
+            Attribute::DataArray(array) if array.elem == ElementType::LookupTable => vec![],
+            Attribute::DataArray(array) => vec![(array.name, array.elem.num_comp(), array.data)],
+            Attribute::Field { data_array, .. } => data_array.into_iter().map(|a| (a.name, a.elem, a.data)).collect(),
+        };
+        for (name, components, data) in found {
+            arrays.push(Array { name: decoded(&name), components: components as usize, values: values(data)? });
+        }
+    }
+    Some(arrays)
+}
+
+fn values(data: IOBuffer) -> Option<Values> {
+    Some(match data {
+        IOBuffer::Bit(_) => return None,
+        IOBuffer::I8(v) => Values::I8(v),
+        IOBuffer::U8(v) => Values::U8(v),
+        IOBuffer::I16(v) => Values::I16(v),
+        IOBuffer::U16(v) => Values::U16(v),
+        IOBuffer::I32(v) => Values::I32(v),
+        IOBuffer::U32(v) => Values::U32(v),
+        IOBuffer::I64(v) => Values::I64(v),
+        IOBuffer::U64(v) => Values::U64(v),
+        IOBuffer::F32(v) => Values::F32(v),
+        IOBuffer::F64(v) => Values::F64(v),
+    })
+}
