@@ -49,7 +49,7 @@ const MULTIBLOCK: &str =
 /// Reads a mesh: the file's grid as it is, nothing welded, dropped or repaired. `progress` is told the share of the work
 /// that is done, in [0, 1], never less than before.
 ///
-/// The content decides: `.vtu` XML of every data mode, uncompressed or zlib, or a legacy `.vtk` file. Several pieces become one
+/// The content decides: `.vtu` XML of every data mode, uncompressed or packed, or a legacy `.vtk` file. Several pieces become one
 /// mesh, with the arrays that all pieces with points (or cells) have: of one number type if they agree, as f64 if not. Arrays of
 /// strings, and field data, are left out. The work is done in the current rayon pool.
 ///

@@ -317,3 +317,22 @@ fn variants_of_the_projection_engine() {
     let sheet = std::fs::read(place.path("sheet.png")).unwrap();
     assert!(sheet.len() > 1000 && sheet.starts_with(b"\x89PNG"));
 }
+
+#[test]
+fn tables_are_compared() {
+    let place = Place::new();
+    place.misused("tables cube.vtu --values 1", "--values");
+    let Ran(code, out, err) =
+        place.run("tables cube.vtu --values 32 --segments 2000 --out sheet.png --json tables.json");
+    assert_eq!((code, err.as_str()), (Some(0), ""));
+    assert!(out.contains("log-normalised") && out.contains("cylindrical"), "{out}");
+    let tables: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(place.path("tables.json")).unwrap()).unwrap();
+    let rms = |form: &str| {
+        let row = tables["tables"].as_array().unwrap().iter().find(|t| t["form"] == form);
+        row.unwrap()["rms"].as_f64().unwrap()
+    };
+    assert!(rms("volume, log-normalised") < 0.02 && rms("polynomial, degree 2") < 0.02, "{tables}");
+    let sheet = std::fs::read(place.path("sheet.png")).unwrap();
+    assert!(sheet.starts_with(b"\x89PNG"));
+}

@@ -63,8 +63,9 @@ const char* const Questions[] = {
   "}\n",
 };
 
-// Where a volume is the first of a stage its picture is what is written; others go over it, as they come from far to near. What lies before all layers may be kept until the first layer was drawn: VTK's layers have 8 bits, and what is
-// written less often is rounded less often.
+// Where a volume is the first of a stage its picture is what is written; others go over it, as they come from far to near. What lies
+// before all layers may be kept until the first layer was drawn: VTK's layers have 8 bits, and what is written less often is rounded
+// less often.
 const char* const Answers[] = {
   "//VTK::System::Dec\n"
   "//VTK::Output::Dec\n"

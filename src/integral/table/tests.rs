@@ -126,7 +126,6 @@ fn planes_stand_for_a_volume() {
         let planes = Cylindrical::new(&smooth, 4 * n, n, 2.0).unwrap();
         let [of_volume, _] = errors(&smooth, 2.0, |f, b, l| volume.look_up(f, b, l));
         let [of_planes, _] = errors(&smooth, 2.0, |f, b, l| planes.look_up(f, b, l));
-        eprintln!("{n}: {of_planes:e} {of_volume:e}");
         assert!(of_planes <= 2.0 * of_volume, "{n}: {of_planes}, {of_volume}");
         assert!(of_planes < 0.6 * last, "{n}: {of_planes} after {last}");
         last = of_planes;

@@ -67,3 +67,20 @@ fn values(data: IOBuffer) -> Option<Values> {
         IOBuffer::F64(v) => Values::F64(v),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_vtkio_would_lose_is_left_to_the_scanner() {
+        let file = |value: &str| {
+            let head = "# vtk DataFile Version 3.0\none cell\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n";
+            let cells = "0 0 0 1 0 0 0 1 0 0 0 1\nCELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n";
+            format!("{head}{cells}POINT_DATA 4\nSCALARS s float 1\nLOOKUP_TABLE default\n1 2 3 {value}\n")
+        };
+        let parts = Parts::parsed(file("4").as_bytes());
+        assert!(parts.is_some_and(|p| p.connectivity == [0, 1, 2, 3] && p.arrays[0][0].values.get(3) == 4.0));
+        assert!(Parts::parsed(file("nan").as_bytes()).is_none());
+    }
+}
