@@ -81,7 +81,7 @@ impl Polynomial {
 /// Lagrange's polynomials, multiplied out.
 fn inverse(degree: usize) -> Inverse {
     let at = |i: usize| i as f64 / degree as f64;
-    let mut rows = vec![vec![0.0; degree + 1]; degree + 1];
+    let mut rows = vec![vec![]; degree + 1];
     for j in 0..=degree {
         // The polynomial that is 1 at j and 0 at the other points.
         let mut powers = vec![1.0];
@@ -93,7 +93,7 @@ fn inverse(degree: usize) -> Inverse {
             }
             powers = next;
         }
-        powers.into_iter().enumerate().for_each(|(k, p)| rows[k][j] = p);
+        rows.iter_mut().zip(powers).for_each(|(row, p)| row.push(p));
     }
     rows
 }
