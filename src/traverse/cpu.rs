@@ -65,7 +65,7 @@ pub fn render<const N: usize>(
                 return tracer.counts;
             }
             for left in (0..w).step_by(TILE as usize) {
-                tracer.tile(left, band as u32 * TILE, rows, pixel);
+                tracer.draw(left, band as u32 * TILE, rows, pixel);
             }
             if progress((done.fetch_add(1, Relaxed) + 1) as f64 / bands as f64).is_break() {
                 stopped.store(true, Relaxed);
@@ -146,7 +146,29 @@ impl<'a, const N: usize> Tracer<'a, N> {
         }
     }
 
+    /// As [`Self::tile`], in the widest instructions that the processor has; their results are the same.
+    fn draw(&mut self, left: u32, top: u32, rows: &mut [[f32; 4]], pixel: &(dyn Fn(&[f32; N]) -> [f32; 4] + Sync)) {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            #[target_feature(enable = "avx2")]
+            fn wide<const N: usize>(
+                tracer: &mut Tracer<N>,
+                left: u32,
+                top: u32,
+                rows: &mut [[f32; 4]],
+                pixel: &(dyn Fn(&[f32; N]) -> [f32; 4] + Sync),
+            ) {
+                tracer.tile(left, top, rows, pixel);
+            }
+            #[allow(unsafe_code, reason = "vector instructions that the processor was just asked about")]
+            // SAFETY: the processor has AVX2.
+            return unsafe { wide(self, left, top, rows, pixel) };
+        }
+        self.tile(left, top, rows, pixel);
+    }
+
     /// Draws the tile whose upper left pixel is (`left`, `top`) into `rows`, which start with row `top` of the image.
+    #[inline(always)]
     fn tile(&mut self, left: u32, top: u32, rows: &mut [[f32; 4]], pixel: &(dyn Fn(&[f32; N]) -> [f32; 4] + Sync)) {
         let w = self.view.size()[0];
         let (right, bottom) = ((left + TILE).min(w), top + (rows.len() as u32 / w).min(TILE));
@@ -162,6 +184,7 @@ impl<'a, const N: usize> Tracer<'a, N> {
     }
 
     /// Draws one pixel, whose candidates were found.
+    #[inline(always)]
     fn pixel(&mut self, i: u32, j: u32, pixel: &(dyn Fn(&[f32; N]) -> [f32; 4] + Sync)) -> [f32; 4] {
         let gathered = self.trace(i, j);
         match (self.view.blend(), gathered.largest) {
@@ -199,6 +222,7 @@ impl<'a, const N: usize> Tracer<'a, N> {
     }
 
     /// Traces the ray of pixel (`i`, `j`).
+    #[inline(always)]
     fn trace(&mut self, i: u32, j: u32) -> Gathered<N> {
         let ray = self.view.ray(i, j);
         let Geometry { centre, scale, .. } = *self.geometry;
@@ -225,6 +249,7 @@ impl<'a, const N: usize> Tracer<'a, N> {
     }
 
     /// Follows one ray; false if it passed too close to an edge of the boundary, unless `anyhow`.
+    #[inline(always)]
     fn walk(
         &mut self,
         frame: &Frame,
@@ -251,6 +276,7 @@ impl<'a, const N: usize> Tracer<'a, N> {
     }
 
     /// Collects where the ray enters the mesh, in order; false if any of it is too close to an edge.
+    #[inline(always)]
     fn find_entries(&mut self, frame: &Frame, pixel: DVec2) -> bool {
         let Geometry { points, boundary, .. } = self.geometry;
         let mut clear = true;
@@ -272,6 +298,7 @@ impl<'a, const N: usize> Tracer<'a, N> {
     }
 
     /// Walks from entry `e` until the ray leaves the mesh or ends; the weights at the exit in the first case.
+    #[inline(always)]
     fn follow(
         &mut self,
         frame: &Frame,
