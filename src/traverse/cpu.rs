@@ -397,6 +397,8 @@ fn prefetch(cells: &[Cell], next: [u32; 4]) {
             _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(cell).cast());
         }
     }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (cells, next);
 }
 
 fn is_close(weights: [f64; 3]) -> bool {
