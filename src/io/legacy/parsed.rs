@@ -18,12 +18,10 @@ impl Parts {
         let Some(Piece::Inline(piece)) = pieces.into_iter().next() else { return None };
         let coordinates = values(piece.points)?;
         let point = |p: usize| DVec3::from_array([0, 1, 2].map(|i| coordinates.get(3 * p + i)));
-        let mut parts = Parts {
-            points: (0..coordinates.len() / 3).map(point).collect(),
-            types: piece.cells.types.iter().map(|kind: &CellType| *kind as u8).collect(),
-            arrays: [arrays(piece.data.point)?, arrays(piece.data.cell)?],
-            ..Parts::default()
-        };
+        let points: Vec<DVec3> = (0..coordinates.len() / 3).map(point).collect();
+        let types: Vec<u8> = piece.cells.types.iter().map(|kind: &CellType| *kind as u8).collect();
+        let arrays = [arrays(piece.data.point, points.len())?, arrays(piece.data.cell, types.len())?];
+        let mut parts = Parts { points, types, arrays, ..Parts::default() };
         match piece.cells.cell_verts {
             VertexNumbers::Legacy { vertices, .. } => parts.unpack(&vertices).ok()?,
             VertexNumbers::XML { connectivity, offsets } => {
@@ -36,8 +34,8 @@ impl Parts {
     }
 }
 
-/// None if one would be lost.
-fn arrays(attributes: Vec<Attribute>) -> Option<Vec<Array>> {
+/// None if one would be lost, or is not as long as `tuples` ask: bits are taken for bytes.
+fn arrays(attributes: Vec<Attribute>, tuples: usize) -> Option<Vec<Array>> {
     let mut arrays = Vec::new();
     for attribute in attributes {
         let found = match attribute {
@@ -46,7 +44,11 @@ fn arrays(attributes: Vec<Attribute>) -> Option<Vec<Array>> {
             Attribute::Field { data_array, .. } => data_array.into_iter().map(|a| (a.name, a.elem, a.data)).collect(),
         };
         for (name, components, data) in found {
-            arrays.push(Array { name: decoded(&name), components: components as usize, values: values(data)? });
+            let (values, components) = (values(data)?, components as usize);
+            if Some(values.len()) != components.checked_mul(tuples) {
+                return None;
+            }
+            arrays.push(Array { name: decoded(&name), components, values });
         }
     }
     Some(arrays)
