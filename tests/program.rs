@@ -322,6 +322,10 @@ fn variants_of_the_projection_engine() {
 fn tables_are_compared() {
     let place = Place::new();
     place.misused("tables cube.vtu --values 1", "--values");
+    place.misused("tables cube.vtu --values 1024", "--values");
+    // No form is left out where the numbers are odd.
+    let Ran(_, out, _) = place.run("tables cube.vtu --values 7 --segments 1");
+    assert_eq!(out.lines().count(), 10, "{out}");
     let Ran(code, out, err) =
         place.run("tables cube.vtu --values 32 --segments 2000 --out sheet.png --json tables.json");
     assert_eq!((code, err.as_str()), (Some(0), ""));
