@@ -12,9 +12,10 @@ use crate::gpu::buffers::{Buffer, Chunks};
 use crate::gpu::raster::{self, Readback, Slot, Texture};
 use crate::gpu::shader::{self, Array, Variant};
 use crate::gpu::sort::Sorter;
+use crate::gpu::table::{self as tables, OnDevice, TABLE};
 use crate::gpu::{DeviceChoice, Gpu, Part, arrays, function};
 use crate::integral::Exact;
-use crate::integral::table::{self, Table};
+use crate::integral::table::Table;
 use crate::order::depth::{self, HIDDEN, IN_PARTS};
 use crate::view::{Blend, View};
 use bytemuck::{Pod, Zeroable};
@@ -134,14 +135,6 @@ pub(crate) struct Project {
     sorts: bool,
 }
 
-/// A table, or what takes its place where there is none.
-struct OnDevice {
-    texels: Texture,
-    filter: wgpu::Sampler,
-    /// `Table` in the shader.
-    parameters: Buffer,
-}
-
 impl std::fmt::Debug for Project {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Project").field("adapter", &self.gpu.adapter.name).finish_non_exhaustive()
@@ -169,12 +162,12 @@ impl Project {
                 Gpu::open(&DeviceChoice::Named(usable.index.to_string()))?.ok_or_else(|| none("there is none"))?
             }
         };
-        use Slot::{Read, Sampler, Uniform, Volume, Write};
+        use Slot::{Read, Uniform, Write};
         let sorts = gpu.adapter.kind != "CPU";
         let shared = raster::layout(
             &gpu,
             Stages::COMPUTE | Stages::VERTEX_FRAGMENT,
-            &[Uniform, Read, Read, Uniform, Read, Read, Volume, Sampler, Uniform],
+            &[&[Uniform, Read, Read, Uniform, Read, Read], &tables::SLOTS[..]].concat(),
         );
         let own = raster::layout(&gpu, Stages::COMPUTE, &[Uniform, Read, Write, Read, Write]);
         let drawn = raster::layout(&gpu, Stages::VERTEX_FRAGMENT, &[Read]);
@@ -365,9 +358,8 @@ impl Project {
         self.table = None;
         let gpu = &self.gpu;
         let on_device = match coloring.table() {
-            None => OnDevice::new(gpu, [1; 3], wgpu::TextureFormat::Rgba8Unorm, &[0; 4], [0.0; 8])?,
+            None => OnDevice::none(gpu)?,
             Some(kind) => {
-                let format = texel_format(gpu, texels)?;
                 let longest = *self.longest.get_or_insert_with(|| geometry.longest_edge());
                 let bytes = size.iter().fold(16, |n: u64, &s| n.saturating_mul(u64::from(s)));
                 if bytes > MOST_TABLE {
@@ -378,7 +370,7 @@ impl Project {
                         "tables are for fields of one component, and have at least 2, 2 and 3 texels along their axes";
                     Error::Render(format!("{what}; use the exact integral"))
                 })?;
-                OnDevice::holding(gpu, &table, format)?
+                OnDevice::holding(gpu, &table, texels)?
             }
         };
         gpu.check()?;
@@ -678,11 +670,7 @@ impl Pass {
             Buffer::holding(gpu, "planes", &seen.planes, Usage::STORAGE)?,
             Buffer::holding(gpu, "ends", &seen.ends, Usage::STORAGE)?,
         ];
-        let shared = function.iter().chain(&buffers).map(|b| b.raw.as_entire_binding()).chain([
-            wgpu::BindingResource::TextureView(&table.texels.view),
-            wgpu::BindingResource::Sampler(&table.filter),
-            table.parameters.raw.as_entire_binding(),
-        ]);
+        let shared = function.iter().chain(&buffers).map(|b| b.raw.as_entire_binding()).chain(table.bindings());
         let arrays = project.chunks()?.into_iter().flat_map(|c| &c.buffers).map(|b| b.raw.as_entire_binding());
         Ok(Pass {
             shared: raster::group(gpu, &project.shared, shared),
@@ -691,73 +679,6 @@ impl Pass {
             _buffers: buffers,
         })
     }
-}
-
-impl OnDevice {
-    fn new(gpu: &Gpu, size: [u32; 3], format: wgpu::TextureFormat, bytes: &[u8], parameters: [f32; 8]) -> Result<Self> {
-        let usage = TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_DST;
-        let texels = Texture::new(gpu, "table", wgpu::TextureDimension::D3, size, format, usage)?;
-        let [width, height, depth] = size;
-        gpu.queue.write_texture(
-            texels.raw.as_image_copy(),
-            bytes,
-            wgpu::TexelCopyBufferLayout {
-                offset: 0,
-                bytes_per_row: Some(width * texel(format) as u32),
-                rows_per_image: Some(height),
-            },
-            wgpu::Extent3d { width, height, depth_or_array_layers: depth },
-        );
-        let filter = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
-            mag_filter: wgpu::FilterMode::Linear,
-            min_filter: wgpu::FilterMode::Linear,
-            ..Default::default()
-        });
-        let parameters = Buffer::holding(gpu, "table", &parameters, Usage::UNIFORM)?;
-        Ok(OnDevice { texels, filter, parameters })
-    }
-
-    fn holding(gpu: &Gpu, table: &Table, format: wgpu::TextureFormat) -> Result<Self> {
-        let greatest = table.greatest();
-        let (scale, bytes) = match format {
-            wgpu::TextureFormat::Rgba32Float => ([1.0; 4], bytemuck::cast_slice(&table.texels).to_vec()),
-            wgpu::TextureFormat::Rgba16Unorm => {
-                let texels: Vec<u16> = shares(table, greatest).map(|v| (v * 65535.0).round() as u16).collect();
-                (greatest, bytemuck::cast_slice(&texels).to_vec())
-            }
-            _ => (greatest, shares(table, greatest).map(|v| (v * 255.0).round() as u8).collect()),
-        };
-        let [w, h, d] = table.size;
-        let step = match table.kind {
-            table::Kind::Uniform => table.longest,
-            table::Kind::Log | table::Kind::LogNormalised => table::length(table.kind, d, table.longest, 1),
-        };
-        let [x, y, z] = [w, h, d].map(|n| n as f32);
-        let [r, g, b, a] = scale;
-        Self::new(gpu, table.size, format, &bytes, [r, g, b, a, x, y, z, step as f32])
-    }
-}
-
-/// All channels of all texels, each over the greatest.
-fn shares(table: &Table, greatest: [f32; 4]) -> impl Iterator<Item = f32> {
-    table.texels.iter().flat_map(move |t| [0, 1, 2, 3].map(|k| t[k] / greatest[k]))
-}
-
-/// The texture format of a table.
-fn texel_format(gpu: &Gpu, texels: Texels) -> Result<wgpu::TextureFormat> {
-    let (format, feature, what) = match texels {
-        Texels::Unorm8 => return Ok(wgpu::TextureFormat::Rgba8Unorm),
-        Texels::Unorm16 => {
-            (wgpu::TextureFormat::Rgba16Unorm, wgpu::Features::TEXTURE_FORMAT_16BIT_NORM, "16-bit textures")
-        }
-        Texels::Float => {
-            (wgpu::TextureFormat::Rgba32Float, wgpu::Features::FLOAT32_FILTERABLE, "filtered 32-bit float textures")
-        }
-    };
-    if gpu.device.features().contains(feature) {
-        return Ok(format);
-    }
-    Err(Error::Device(format!("{} has no {what}; use other texels for the table", gpu.adapter.name)))
 }
 
 impl Ordered {
@@ -865,7 +786,7 @@ fn stride<const N: usize>(form: Fragments) -> u64 {
 fn texel(format: wgpu::TextureFormat) -> usize {
     match format {
         wgpu::TextureFormat::Rgba32Float => 16,
-        wgpu::TextureFormat::Rgba16Float | wgpu::TextureFormat::Rgba16Unorm => 8,
+        wgpu::TextureFormat::Rgba16Float => 8,
         _ => 4,
     }
 }
@@ -919,7 +840,8 @@ fn program(variant: &Variant, association: &str, switches: &Switches, limits: Li
     text += arrays::POINT;
     let [records, drawing] = if form == "INTERSECTED" { INTERSECTED } else { INTERPOLATED };
     text += &shader::accessors(arrays);
-    [&text, shader::CELL, shader::INTEGRAL, SHARED, CELLS, records, SHADE, drawing].join("\n")
+    text += &tables::declarations(0, 6);
+    [&text, shader::CELL, shader::INTEGRAL, TABLE, SHARED, CELLS, records, SHADE, drawing].join("\n")
 }
 #[cfg(test)]
 mod tests;
