@@ -5,20 +5,20 @@
 //! 3. Batch by batch, in that order, `project` (compute) makes a record of each cell, and the records are drawn.
 
 use super::frame::{FAR, FILLED, Frame, Limits, Seen, filled};
-use super::{Coloring, Compositing, Counts, Fragments, Order, Switches, Target, Texels, Thickness};
+use super::{Compositing, Counts, Fragments, Order, Switches, Target, Thickness};
 use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Values};
 use crate::gpu::buffers::{Buffer, Chunks};
 use crate::gpu::raster::{self, Readback, Slot, Texture};
 use crate::gpu::shader::{self, Array, Variant};
 use crate::gpu::sort::Sorter;
-use crate::gpu::table::{self as tables, OnDevice, TABLE};
+use crate::gpu::table::{self, TABLE};
 use crate::gpu::{DeviceChoice, Gpu, Part, arrays, function};
-use crate::integral::Exact;
-use crate::integral::table::Table;
+use crate::integral::{Exact, Lookup};
 use crate::order::depth::{self, HIDDEN, IN_PARTS};
 use crate::view::{Blend, View};
 use bytemuck::{Pod, Zeroable};
+use std::sync::Arc;
 use std::time::Instant;
 use wgpu::{BufferUsages as Usage, ShaderStages as Stages, TextureUsages};
 
@@ -48,9 +48,6 @@ const REPEATED: usize = 2;
 
 /// Cells that are classified at once.
 const CLASSIFIED: usize = 1 << 24;
-
-/// Bytes of a table at most.
-const MOST_TABLE: u64 = 1 << 30;
 
 /// Invocations of a compute group, and groups along one axis at most.
 const GROUP: u32 = 64;
@@ -127,9 +124,7 @@ pub(crate) struct Project {
     program: Option<Program>,
     canvas: Option<(Fragments, [u32; 2], wgpu::TextureFormat, u64, Canvas)>,
     ordered: Option<Ordered>,
-    /// Longest edge of a cell, in normalised units.
-    longest: Option<f64>,
-    table: Option<(Coloring, [u32; 3], Texels, OnDevice)>,
+    table: table::Held,
     sorter: Option<Sorter>,
     /// Whether the device sorts, and not the host.
     sorts: bool,
@@ -167,7 +162,7 @@ impl Project {
         let shared = raster::layout(
             &gpu,
             Stages::COMPUTE | Stages::VERTEX_FRAGMENT,
-            &[&[Uniform, Read, Read, Uniform, Read, Read], &tables::SLOTS[..]].concat(),
+            &[&[Uniform, Read, Read, Uniform, Read, Read], &table::SLOTS[..]].concat(),
         );
         let own = raster::layout(&gpu, Stages::COMPUTE, &[Uniform, Read, Write, Read, Write]);
         let drawn = raster::layout(&gpu, Stages::VERTEX_FRAGMENT, &[Read]);
@@ -183,8 +178,7 @@ impl Project {
             program: None,
             canvas: None,
             ordered: None,
-            longest: None,
-            table: None,
+            table: table::Held::default(),
             sorter: None,
             sorts,
         })
@@ -202,10 +196,10 @@ impl Project {
 
     /// Takes `part` for changed.
     pub(crate) fn forget(&mut self, part: Part) {
-        (self.ordered, self.table) = (None, None);
+        self.ordered = None;
         match part {
-            Part::Mesh => (self.cells, self.points, self.values, self.longest) = (None, None, None, None),
-            Part::Points => (self.points, self.longest) = (None, None),
+            Part::Mesh => (self.cells, self.points, self.values) = (None, None, None),
+            Part::Points => self.points = None,
             Part::Field => self.values = None,
             Part::Function => self.function = None,
         }
@@ -240,7 +234,7 @@ impl Project {
         geometry: &Geometry,
         values: &Values<N>,
         exact: &Exact<f32>,
-        precise: &dyn Fn() -> Exact<f64>,
+        table: Option<&Arc<Lookup>>,
         view: &View,
         switches: &Switches,
     ) -> Result<(Vec<[f32; 4]>, Counts)> {
@@ -250,12 +244,12 @@ impl Project {
         }
         let format = self.format(switches.target)?;
         self.upload(geometry, values, exact)?;
-        self.prepare_table(geometry, precise, switches)?;
+        self.table.prepare(&self.gpu, table)?;
         let association = arrays::association(values);
         let arrays = self.arrays()?;
         let seen = Seen::new(geometry, view);
         let variant = Variant { kind: exact.kind, direct: exact.direct };
-        let source = program(&variant, association, switches, seen.limits(), &arrays);
+        let source = program(&variant, association, switches, table.map(|t| &**t), seen.limits(), &arrays);
         self.compile(&arrays, source, switches.compositing, format)?;
         self.prepare_canvas::<N>(switches.fragments, view.size(), format)?;
         let frame = Pass::new(self, &seen)?;
@@ -338,43 +332,6 @@ impl Project {
         };
         gpu.check()?;
         self.program = Some(program);
-        Ok(())
-    }
-
-    /// Builds and hands over the table that is wanted; without one, the smallest texture that can be bound.
-    fn prepare_table(
-        &mut self,
-        geometry: &Geometry,
-        precise: &dyn Fn() -> Exact<f64>,
-        switches: &Switches,
-    ) -> Result<()> {
-        let Switches { coloring, table: size, texels, .. } = *switches;
-        let same = |t: &(Coloring, [u32; 3], Texels, OnDevice)| {
-            t.0 == coloring && (coloring == Coloring::Exact || (t.1, t.2) == (size, texels))
-        };
-        if self.table.as_ref().is_some_and(same) {
-            return Ok(());
-        }
-        self.table = None;
-        let gpu = &self.gpu;
-        let on_device = match coloring.table() {
-            None => OnDevice::none(gpu)?,
-            Some(kind) => {
-                let longest = *self.longest.get_or_insert_with(|| geometry.longest_edge());
-                let bytes = size.iter().fold(16, |n: u64, &s| n.saturating_mul(u64::from(s)));
-                if bytes > MOST_TABLE {
-                    return Err(Error::Render(format!("a table of {size:?} texels takes {bytes} bytes; choose less")));
-                }
-                let table = Table::new(&precise(), kind, size, longest).ok_or_else(|| {
-                    let what =
-                        "tables are for fields of one component, and have at least 2, 2 and 3 texels along their axes";
-                    Error::Render(format!("{what}; use the exact integral"))
-                })?;
-                OnDevice::holding(gpu, &table, texels)?
-            }
-        };
-        gpu.check()?;
-        self.table = Some((coloring, size, texels, on_device));
         Ok(())
     }
 
@@ -660,8 +617,8 @@ impl FilledBinding {
 impl Pass {
     fn new(project: &Project, seen: &Seen) -> Result<Self> {
         let gpu = &project.gpu;
-        let (Some((function, filled)), Some(program), Some((.., table))) =
-            (&project.function, &project.program, &project.table)
+        let (Some((function, filled)), Some(program), Some(table)) =
+            (&project.function, &project.program, project.table.get())
         else {
             return Err(unprepared());
         };
@@ -809,7 +766,14 @@ fn pixels(bytes: &[u8], format: wgpu::TextureFormat) -> Vec<[f32; 4]> {
 }
 
 /// The whole program.
-fn program(variant: &Variant, association: &str, switches: &Switches, limits: Limits, arrays: &[Array]) -> String {
+fn program(
+    variant: &Variant,
+    association: &str,
+    switches: &Switches,
+    table: Option<&Lookup>,
+    limits: Limits,
+    arrays: &[Array],
+) -> String {
     let mut text = shader::prelude(variant);
     for (name, value) in [("FAR", f64::from(FAR)), ("SHARP", SHARP), ("GROWTH", GROWTH), ("BESIDE", 1e-6)] {
         text += &format!("const {name} = {value:?}f;\n");
@@ -833,14 +797,13 @@ fn program(variant: &Variant, association: &str, switches: &Switches, limits: Li
     text += &format!(
         "const HIDDEN = {HIDDEN}u;\nconst IN_PARTS = {IN_PARTS}u;\nconst FILLED = {FILLED}u;\nconst MOST_WORK = {MOST_WORK}u;\n\
          const INTERSECTED = 0u;\nconst INTERPOLATED = 1u;\nconst LINEAR = 2u;\nconst FORM = {form};\nconst CORNERS = {corners}u;\n\
-         const EXACT = 0u;\nconst UNIFORM = 1u;\nconst LOG = 2u;\nconst LOG_NORMALISED = 3u;\nconst COLORING = {}u;\n\
-         const POINT = 0u;\nconst CORNER = 1u;\nconst CELL = 2u;\nconst ASSOCIATION = {association};\n",
-        switches.coloring as u32
+         const POINT = 0u;\nconst CORNER = 1u;\nconst CELL = 2u;\nconst ASSOCIATION = {association};\n"
     );
     text += arrays::POINT;
     let [records, drawing] = if form == "INTERSECTED" { INTERSECTED } else { INTERPOLATED };
     text += &shader::accessors(arrays);
-    text += &tables::declarations(0, 6);
+    text += &table::constants(table);
+    text += &table::declarations(0, 6);
     [&text, shader::CELL, shader::INTEGRAL, TABLE, SHARED, CELLS, records, SHADE, drawing].join("\n")
 }
 #[cfg(test)]
