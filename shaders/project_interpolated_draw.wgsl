@@ -13,6 +13,8 @@ struct Drawn {
     @location(4) @interpolate(flat) greatest: Value,
     @location(5) @interpolate(flat) longest: f32,
     @location(6) @interpolate(flat) rank: u32,
+    /// Around a table's diagonal: see `plane_of`.
+    @location(7) @interpolate(flat) plane: f32,
 }
 
 @vertex
@@ -24,6 +26,9 @@ fn vertex(@builtin(vertex_index) index: u32) -> Drawn {
     drawn.depths = vec4f(drawn_records[i].front_depth, drawn_records[i].back_depth, drawn_records[i].difference, drawn_records[i].thickness);
     drawn.front = drawn_records[i].front;
     drawn.back = drawn_records[i].back;
+    if PLANE_PER_CELL {
+        drawn.plane = plane_of(last_of(drawn.front), last_of(drawn.back), drawn_records[i].thickness);
+    }
     if k < 4u {
         at = drawn_records[i].outline[k];
         let depth = drawn_records[i].depths[k];
@@ -45,6 +50,7 @@ fn vertex(@builtin(vertex_index) index: u32) -> Drawn {
 
 @fragment
 fn fragment(drawn: Drawn) -> @location(0) vec4f {
+    cell_plane = drawn.plane;
     let xy = sample_of(drawn.at.xy);
     let direction = direction_at(xy);
     let stretch = length(direction);

@@ -35,7 +35,11 @@ fn every_program_is_valid() {
                         target: Target::Rgba8,
                         ..Switches::default()
                     };
-                    let limits = Limits { ends: direct, planes: chunks > 1 };
+                    let limits = Limits {
+                        ends: direct,
+                        planes: chunks > 1,
+                        plane_per_cell: direct && fragments != Fragments::Intersected,
+                    };
                     let variant = Variant { kind, direct };
                     let arrays = arrays(chunks);
                     validated(&program(&variant, association, &switches, table.as_ref(), limits, &arrays));
