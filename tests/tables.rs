@@ -106,7 +106,7 @@ fn forms() -> Vec<(Choice, f64)> {
         (volume(Kind::LogNormalised, [128, 128, 12]), 2e-3),
         (polynomial(1), 3e-3),
         (polynomial(2), 2e-3),
-        (Choice { alpha: Alpha::Linear, ..polynomial(2) }, 0.3),
+        (Choice { alpha: Alpha::Linear, ..polynomial(2) }, 0.6),
         (cylindrical(Planes::Two), 2e-2),
         (cylindrical(Planes::Packed), 2e-2),
         (cylindrical(Planes::One), 3e-2),
