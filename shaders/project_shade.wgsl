@@ -62,18 +62,6 @@ fn integrated(front: Value, back: Value, length: f32, first: u32, first_line: Li
     return vec4f(sum.xyz, 1.0 - sum.w);
 }
 
-/// How a table is looked up.
-struct Table {
-    /// What its texels are divided by.
-    scale: vec4f,
-    /// Its size, and the length of the thinnest slice but 0 (or, if lengths are uniform, of the last).
-    size: vec4f,
-}
-
-@group(0) @binding(6) var table_texels: texture_3d<f32>;
-@group(0) @binding(7) var table_filter: sampler;
-@group(0) @binding(8) var<uniform> table: Table;
-
 /// Premultiplied colour and opacity of a segment.
 fn colored(front: Value, back: Value, length: f32, i: u32, line: Line) -> vec4f {
     work = 0u;
@@ -85,19 +73,7 @@ fn colored(front: Value, back: Value, length: f32, i: u32, line: Line) -> vec4f 
         add_segment(front, back, length);
         return vec4f(light.xyz, 1.0 - light.w);
     }
-    // Values and lengths to the centres of texels; the last by equation 1.
-    let steps = length / table.size.w;
-    let slices = select(log2(max(steps, 1.0)) + min(steps, 1.0), steps * (table.size.z - 1.0), COLORING == UNIFORM);
-    let ends = (vec2f(last_of(front), last_of(back)) * 0.5 + 0.5) * (table.size.xy - 1.0);
-    let at = (vec3f(ends, slices) + 0.5) / table.size.xyz;
-    let texel = textureSampleLevel(table_texels, table_filter, at, 0.0) * table.scale;
-    if COLORING != LOG_NORMALISED {
-        return texel;
-    }
-    let opacity = opacity_of_depth(length * texel.w);
-    // Of direct emission, what is seen of the length.
-    let share = select(opacity, select(length, opacity / texel.w, length * texel.w > 1e-6), DIRECT);
-    return vec4f(texel.xyz * share, opacity);
+    return tabulated(last_of(front), last_of(back), length);
 }
 
 /// Jarzynski & Olano's hash of three numbers, pcg3d (2020).

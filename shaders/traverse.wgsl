@@ -388,6 +388,6 @@ fn gather(front: Value, back: Value, share: vec2f, length: f32) {
         largest = select(largest, f, last_of(f) > last_of(largest));
         largest = select(largest, b, last_of(b) > last_of(largest));
     } else {
-        add_segment(f, b, length);
+        add(f, b, length);
     }
 }

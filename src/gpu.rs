@@ -8,6 +8,7 @@ pub(crate) mod function;
 pub(crate) mod raster;
 pub(crate) mod shader;
 pub(crate) mod sort;
+pub(crate) mod table;
 #[cfg(test)]
 #[allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr, reason = "tests")]
 pub(crate) mod testing;

@@ -13,12 +13,16 @@
 //! where nothing more can be seen.
 
 mod batch;
+pub mod choice;
 mod knots;
+pub mod lookup;
 pub mod table;
 
 pub use batch::Batch;
+pub use choice::{Choice, Form};
 pub(crate) use knots::BUCKETS;
 pub use knots::Knots;
+pub use lookup::{Integral, Lookup};
 
 use crate::field::{Kind, Normal};
 use crate::real::Real;

@@ -7,11 +7,10 @@
 mod frame;
 pub(crate) mod gpu;
 
-use crate::integral::table;
 use serde::{Deserialize, Serialize};
 
 /// Which variant of the engine draws. The default is the most accurate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
 pub struct Switches {
     /// Where the values and lengths of a fragment come from.
@@ -27,28 +26,6 @@ pub struct Switches {
     pub dither: bool,
     /// How a cell joins what lies behind it.
     pub compositing: Compositing,
-    /// Where a fragment's colour and opacity come from.
-    pub coloring: Coloring,
-    /// Values in front, values behind and lengths of a table.
-    pub table: [u32; 3],
-    /// What a table's texels are.
-    pub texels: Texels,
-}
-
-impl Default for Switches {
-    fn default() -> Self {
-        Switches {
-            fragments: Fragments::default(),
-            thickness: Thickness::default(),
-            order: Order::default(),
-            target: Target::default(),
-            dither: false,
-            compositing: Compositing::default(),
-            coloring: Coloring::default(),
-            table: [256, 256, 16],
-            texels: Texels::default(),
-        }
-    }
 }
 
 /// Where the values and lengths of a fragment come from.
@@ -111,46 +88,6 @@ pub enum Compositing {
     Over,
     /// It hides nothing.
     Additive,
-}
-
-/// Where a fragment's colour and opacity come from.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Coloring {
-    /// The exact integral.
-    #[default]
-    Exact,
-    /// A table of premultiplied colour and opacity for lengths that are equally far apart.
-    Uniform,
-    /// The same for logarithmic lengths: some 4 % too much of both in thin cells. See [`crate::integral::table`].
-    Log,
-    /// A table of colour and mean extinction for logarithmic lengths, without that fault.
-    LogNormalised,
-}
-
-impl Coloring {
-    /// The kind of table, if it is one.
-    pub fn table(self) -> Option<table::Kind> {
-        match self {
-            Coloring::Exact => None,
-            Coloring::Uniform => Some(table::Kind::Uniform),
-            Coloring::Log => Some(table::Kind::Log),
-            Coloring::LogNormalised => Some(table::Kind::LogNormalised),
-        }
-    }
-}
-
-/// What a table's texels are.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Texels {
-    /// 32-bit floats.
-    #[default]
-    Float,
-    /// 16 bits, of the range from 0 to the largest there is.
-    Unorm16,
-    /// 8 bits, likewise.
-    Unorm8,
 }
 
 /// What a frame took.

@@ -1,12 +1,14 @@
 //! The whole flow behind one door: mesh, field, transfer function and view in, image out.
 
+mod tables;
+
 use crate::error::{Error, Result};
 use crate::field::{Field, Kind, Normal};
 use crate::geometry::{Geometry, Values};
 use crate::gpu::Part;
 use crate::gpu::{DeviceChoice, Gpu};
 use crate::image::Image;
-use crate::integral::Exact;
+use crate::integral::{Choice, Exact, Form, Integral, Lookup, lookup};
 use crate::mesh::Mesh;
 use crate::mesh::cells::Tetrahedra;
 use crate::mesh::faces::Faces;
@@ -18,8 +20,10 @@ use crate::view::{Blend, View};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::Instant;
+use tables::{Key, Tables};
 
 /// How frames are drawn.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -47,6 +51,12 @@ pub struct Renderer {
     field: Option<Prepared>,
     transfer: Option<TransferFunction>,
     exact: Option<Exact<f32>>,
+    integral: Choice,
+    tables: Tables,
+    /// What of a table is needed, once that is known: none for the exact integral.
+    key: Option<Option<Arc<Key>>>,
+    /// Whether the next frame waits for its table.
+    waits: bool,
     stats: Stats,
 }
 
@@ -78,6 +88,8 @@ struct Loaded {
     geometry: Geometry,
     points: usize,
     cells: usize,
+    /// The longest edge of a cell, in normalised units, once somebody asked.
+    longest: Option<f64>,
 }
 
 /// The field that is drawn.
@@ -113,6 +125,14 @@ pub struct Stats {
     pub upload_ms: f64,
     /// The last frame, in ms.
     pub frame_ms: f64,
+    /// The form of the ray integral that it was drawn with.
+    pub integral: String,
+    /// Building its table, in ms, and what that takes, in bytes; 0 without one.
+    pub table_ms: f64,
+    /// See [`Self::table_ms`].
+    pub table_bytes: u64,
+    /// Knots of the function that the values of the mean cell have between them; 0 unless the form is chosen by that.
+    pub knots_per_cell: f64,
     /// Tetrahedra visited in the last frame, over all rays.
     pub steps: u64,
     /// Rays of the last frame that had to be traced again beside an edge.
@@ -192,6 +212,10 @@ impl Renderer {
             field: None,
             transfer: None,
             exact: None,
+            integral: Choice::default(),
+            tables: Tables::default(),
+            key: None,
+            waits: true,
             stats,
         };
         renderer.name_device();
@@ -218,7 +242,7 @@ impl Renderer {
 
     /// Takes `part` for changed, wherever it is kept.
     fn forget(&mut self, part: Part) {
-        self.exact = None;
+        (self.exact, self.key) = (None, None);
         if let Some(traverse) = &mut self.device {
             traverse.forget(part);
             traverse.forget(Part::Function);
@@ -232,6 +256,20 @@ impl Renderer {
     /// Draws with other variants of the projection engine from now on; nothing to other engines.
     pub fn set_switches(&mut self, switches: Switches) {
         self.switches = switches;
+    }
+
+    /// Integrates segments in another form from now on; the next frame waits for its table, if it is one.
+    pub fn set_integral(&mut self, integral: Choice) {
+        if self.integral != integral {
+            self.integral = integral;
+            (self.key, self.waits) = (None, true);
+        }
+    }
+
+    /// Has the next frame wait for its table. Else one that follows a change of the transfer function is drawn with the exact
+    /// integral while its table is built, and so are those after it until that is done.
+    pub fn wait_for_table(&mut self) {
+        self.waits = true;
     }
 
     /// Runs `work`, such as reading a file, on the renderer's threads.
@@ -263,7 +301,8 @@ impl Renderer {
         self.stats.device_bytes = geometry.bytes();
         self.field = None;
         self.forget(Part::Mesh);
-        self.mesh = Some(Loaded { tetrahedra, geometry, points: points.len(), cells });
+        self.mesh = Some(Loaded { tetrahedra, geometry, points: points.len(), cells, longest: None });
+        self.waits = true;
     }
 
     /// Moves the points of the mesh; cells, fields and values stay. Cells keep their neighbours, so none may turn inside out,
@@ -279,6 +318,7 @@ impl Renderer {
         let scale = mesh.geometry.scale;
         self.pool.install(|| mesh.geometry.set_points(&mesh.tetrahedra.points(points)));
         let scaled = mesh.geometry.scale != scale;
+        (mesh.longest, self.key) = (None, None);
         if let Some(traverse) = &mut self.device {
             traverse.forget(Part::Points);
         }
@@ -312,6 +352,7 @@ impl Renderer {
             };
         self.field = Some(Prepared { normal: [0, 1, 2, 3].map(|k| field.normal(k)), values });
         self.forget(Part::Field);
+        self.waits = true;
         self.stats.upload_ms = ms(start);
         Ok(())
     }
@@ -379,7 +420,7 @@ impl Renderer {
     fn try_render(&mut self, view: &View, progress: &Progress) -> Result<Image> {
         let start = Instant::now();
         let missing = |what: &str| Error::Render(format!("there is no {what} to draw"));
-        let mesh = self.mesh.as_ref().ok_or_else(|| missing("mesh"))?;
+        let mesh = self.mesh.as_mut().ok_or_else(|| missing("mesh"))?;
         let field = self.field.as_ref().ok_or_else(|| missing("field"))?;
         let transfer = self.transfer.as_ref().ok_or_else(|| missing("transfer function"))?;
         let kind = match field.values {
@@ -388,14 +429,45 @@ impl Renderer {
             AnyValues::Rgba(_) => Kind::Rgba,
         };
         let exact = self.exact.get_or_insert_with(|| Exact::new(transfer, kind, &field.normal, mesh.geometry.scale));
+        let key = match &self.key {
+            Some(key) => key,
+            None => {
+                let mut choice = self.integral;
+                self.stats.knots_per_cell = 0.0;
+                if choice.form == Form::Auto {
+                    choice.form = Form::Exact;
+                    if let AnyValues::Scalar(v) = &field.values {
+                        self.stats.knots_per_cell = tables::knots_in_cells(&mesh.geometry, v, exact);
+                        choice = self.integral.resolved(self.stats.knots_per_cell, exact.opacity.len());
+                    }
+                }
+                lookup::check(&choice, choice.size(exact.opacity.len()), kind)?;
+                let key = (choice.form != Form::Exact).then(|| {
+                    let (pool, geometry) = (&self.pool, &mesh.geometry);
+                    let longest = *mesh.longest.get_or_insert_with(|| pool.install(|| geometry.longest_edge()));
+                    let exact = Exact::new(transfer, kind, &field.normal, geometry.scale);
+                    Arc::new(Key { exact, choice, longest })
+                });
+                self.key.insert(key)
+            }
+        };
+        // The largest value along a ray is found without an integral.
+        let built = match key.as_ref().filter(|_| view.blend() == Blend::Composite) {
+            Some(key) => self.tables.get(key, self.waits, &self.pool)?,
+            None => None,
+        };
+        let (mesh, table) = (&*mesh, built.as_ref().map(|b| &b.table));
+        self.waits = false;
+        self.stats.integral = table.map_or(Form::Exact, |t| t.choice().form).name().into();
+        self.stats.table_ms = built.as_ref().map_or(0.0, |b| b.ms);
+        self.stats.table_bytes = table.map_or(0, |t| Choice::bytes(t.size()));
         if let Some(project) = &mut self.project {
             let uploaded = project.gpu().uploaded();
             let (geometry, switches) = (&mesh.geometry, &self.switches);
-            let precise = || Exact::<f64>::new(transfer, kind, &field.normal, geometry.scale);
             let (pixels, counts) = self.pool.install(|| match &field.values {
-                AnyValues::Scalar(v) => project.render(geometry, v, exact, &precise, view, switches),
-                AnyValues::Pair(v) => project.render(geometry, v, exact, &precise, view, switches),
-                AnyValues::Rgba(v) => project.render(geometry, v, exact, &precise, view, switches),
+                AnyValues::Scalar(v) => project.render(geometry, v, exact, table, view, switches),
+                AnyValues::Pair(v) => project.render(geometry, v, exact, table, view, switches),
+                AnyValues::Rgba(v) => project.render(geometry, v, exact, table, view, switches),
             })?;
             let _ = progress(1.0);
             self.stats.uploaded_bytes = project.gpu().uploaded() - uploaded;
@@ -407,7 +479,7 @@ impl Renderer {
             self.stats.frame_ms = ms(start);
             return Ok(Image { size: view.size(), pixels });
         }
-        let frame = Frame { mesh, field, transfer, exact, view, progress };
+        let frame = Frame { mesh, field, transfer, exact, table, view, progress };
         let device = &mut self.device;
         let uploaded = device.as_ref().map_or(0, |t| t.gpu().uploaded());
         let (image, counts, device_ms) = self.pool.install(|| match &field.values {
@@ -445,6 +517,7 @@ struct Frame<'a> {
     field: &'a Prepared,
     transfer: &'a TransferFunction,
     exact: &'a Exact<f32>,
+    table: Option<&'a Arc<Lookup>>,
     view: &'a View,
     progress: &'a Progress<'a>,
 }
@@ -456,12 +529,13 @@ impl Frame<'_> {
         device: &mut Option<Traverse>,
     ) -> Result<(Image, cpu::Counts, Option<f64>)> {
         let geometry = &self.mesh.geometry;
+        let integral = Integral { exact: self.exact, table: self.table.map(|t| &**t) };
         let pixel = |v: &[f32; N]| self.largest(v);
         let Some(traverse) = device else {
-            let (image, counts) = cpu::render(geometry, values, self.exact, &pixel, self.view, self.progress);
+            let (image, counts) = cpu::render(geometry, values, integral, &pixel, self.view, self.progress);
             return Ok((image, counts, None));
         };
-        let mut drawn = traverse.render(geometry, values, self.exact, self.view)?;
+        let mut drawn = traverse.render(geometry, values, self.exact, self.table, self.view)?;
         let unfinished = Traverse::unfinished(&drawn.pixels);
         if self.view.blend() == Blend::Maximum {
             drawn
@@ -469,7 +543,7 @@ impl Frame<'_> {
                 .par_iter_mut()
                 .for_each(|p| *p = Traverse::largest(p).map_or([0.0; 4], |v: [f32; N]| pixel(&v)));
         }
-        let by_cpu = cpu::render_pixels(geometry, values, self.exact, &pixel, self.view, &unfinished);
+        let by_cpu = cpu::render_pixels(geometry, values, integral, &pixel, self.view, &unfinished);
         unfinished.iter().zip(by_cpu).for_each(|(&i, p)| drawn.pixels[i] = p);
         drawn.counts.unfinished = unfinished.len() as u64;
         let _ = (self.progress)(1.0);

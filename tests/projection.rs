@@ -18,8 +18,10 @@ use glam::{DVec3, dvec3};
 use halite::field::Association;
 use halite::gpu::DeviceChoice;
 use halite::image::Image;
+use halite::integral::choice::{Choice, Form, Texels};
+use halite::integral::table::Kind;
 use halite::mesh::{Array, Mesh, Values, generate};
-use halite::project::{Coloring, Compositing, Fragments, Order, Switches, Target, Texels, Thickness};
+use halite::project::{Compositing, Fragments, Order, Switches, Target, Thickness};
 use halite::render::{self, Renderer};
 use halite::transfer::{Emission, TransferFunction};
 use halite::view::{Blend, Camera, Projection, View};
@@ -177,16 +179,28 @@ fn perspective_interpolation_cures_linear() {
     assert!(interpolated < 5e-4 && intersected < 1e-5);
 }
 
+/// The errors of tables of three parameters in a scene, against the judge.
+fn table_errors<const N: usize>((scene, view): &(Scene, View), volumes: [Choice; N]) -> Option<[f64; N]> {
+    let mut renderer = renderer()?;
+    set(&mut renderer, scene);
+    let expected = Engine::Reference.image(scene, view);
+    Some(volumes.map(|choice| {
+        renderer.set_integral(choice);
+        rmse(&image(&mut renderer, Switches::default(), view), &expected)
+    }))
+}
+
+fn volume(lengths: Kind, texels: Texels, table: [u32; 3]) -> Choice {
+    Choice { lengths, texels, table: Some(table), ..Choice::of(Form::Volume) }
+}
+
 #[test]
 fn more_bits_cure_the_table() {
-    let texels = |texels| Switches { coloring: Coloring::LogNormalised, texels, ..Switches::default() };
-    let published = |texels| Switches { coloring: Coloring::Log, texels, ..Switches::default() };
-    let variants = [Texels::Unorm8, Texels::Unorm16, Texels::Float].map(texels);
-    let Some([eight, sixteen, float]) = errors(&thin(), variants) else { return };
-    let Some([published_eight, published_sixteen]) = errors(&thin(), [Texels::Unorm8, Texels::Unorm16].map(published))
-    else {
-        return;
-    };
+    let of = |lengths| move |texels| volume(lengths, texels, [256, 256, 16]);
+    let normalised = [Texels::Unorm8, Texels::Unorm16, Texels::Float].map(of(Kind::LogNormalised));
+    let Some([eight, sixteen, float]) = table_errors(&thin(), normalised) else { return };
+    let published = [Texels::Unorm8, Texels::Unorm16].map(of(Kind::Log));
+    let Some([published_eight, published_sixteen]) = table_errors(&thin(), published) else { return };
     eprintln!(
         "8 bits {eight:.1e}, 16 {sixteen:.1e}, float {float:.1e}; as published {published_eight:.1e}, {published_sixteen:.1e}"
     );
@@ -197,9 +211,8 @@ fn more_bits_cure_the_table() {
 
 #[test]
 fn logarithmic_lengths_cure_uniform_ones() {
-    let coloring = |coloring| Switches { coloring, table: [64, 64, 16], ..Switches::default() };
-    let variants = [Coloring::Uniform, Coloring::Log, Coloring::LogNormalised].map(coloring);
-    let Some([uniform, log, normalised]) = errors(&huge_neighbour(), variants) else { return };
+    let volumes = [Kind::Uniform, Kind::Log, Kind::LogNormalised].map(|k| volume(k, Texels::Float, [64, 64, 16]));
+    let Some([uniform, log, normalised]) = table_errors(&huge_neighbour(), volumes) else { return };
     eprintln!("uniform {uniform:.1e}, log {log:.1e}, normalised {normalised:.1e}");
     assert!(uniform > 2.0 * log && log > 5.0 * normalised && normalised < 1e-3);
 }
@@ -297,9 +310,10 @@ fn what_it_cannot_draw_it_says() {
     set(&mut renderer, &scene);
     let maximum = renderer.render(&view.clone().with_blend(Blend::Maximum), &|_| ()).unwrap_err();
     assert!(maximum.to_string().contains("traverse"), "{maximum}");
-    renderer.set_switches(Switches { coloring: Coloring::Log, table: [1, 1, 1], ..Switches::default() });
+    renderer.set_integral(volume(Kind::Log, Texels::Float, [1, 1, 1]));
     let table = renderer.render(&view, &|_| ()).unwrap_err();
     assert!(table.to_string().contains("table"), "{table}");
+    renderer.set_integral(Choice::default());
     let cpu = Renderer::with_engine(1, DeviceChoice::Cpu, render::Engine::Project).unwrap_err();
     assert!(cpu.to_string().contains("graphics device"), "{cpu}");
     // It draws on after all of these.

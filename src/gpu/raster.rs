@@ -118,6 +118,8 @@ pub(crate) enum Slot {
     Write,
     /// A three-dimensional texture that is filtered.
     Volume,
+    /// An array of two-dimensional textures that are filtered.
+    Layers,
     /// A sampler that filters.
     Sampler,
 }
@@ -125,6 +127,11 @@ pub(crate) enum Slot {
 /// The layout of a group whose bindings are numbered from 0, for `stages`.
 pub(crate) fn layout(gpu: &Gpu, stages: wgpu::ShaderStages, slots: &[Slot]) -> wgpu::BindGroupLayout {
     let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+    let texture = |view_dimension| wgpu::BindingType::Texture {
+        sample_type: wgpu::TextureSampleType::Float { filterable: true },
+        view_dimension,
+        multisampled: false,
+    };
     let entries: Vec<_> = (0..)
         .zip(slots)
         .map(|(binding, slot)| wgpu::BindGroupLayoutEntry {
@@ -134,11 +141,8 @@ pub(crate) fn layout(gpu: &Gpu, stages: wgpu::ShaderStages, slots: &[Slot]) -> w
                 Slot::Uniform => buffer(wgpu::BufferBindingType::Uniform),
                 Slot::Read => buffer(wgpu::BufferBindingType::Storage { read_only: true }),
                 Slot::Write => buffer(wgpu::BufferBindingType::Storage { read_only: false }),
-                Slot::Volume => wgpu::BindingType::Texture {
-                    sample_type: wgpu::TextureSampleType::Float { filterable: true },
-                    view_dimension: wgpu::TextureViewDimension::D3,
-                    multisampled: false,
-                },
+                Slot::Volume => texture(wgpu::TextureViewDimension::D3),
+                Slot::Layers => texture(wgpu::TextureViewDimension::D2Array),
                 Slot::Sampler => wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
             },
             count: None,

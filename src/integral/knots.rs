@@ -55,6 +55,11 @@ impl<R: Real> Knots<R> {
         self.s.len()
     }
 
+    /// Where they are, ascending.
+    pub(crate) fn places(&self) -> &[R] {
+        &self.s
+    }
+
     /// Never true: there are at least the two outer knots.
     pub fn is_empty(&self) -> bool {
         self.s.is_empty()

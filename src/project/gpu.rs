@@ -5,19 +5,20 @@
 //! 3. Batch by batch, in that order, `project` (compute) makes a record of each cell, and the records are drawn.
 
 use super::frame::{FAR, FILLED, Frame, Limits, Seen, filled};
-use super::{Coloring, Compositing, Counts, Fragments, Order, Switches, Target, Texels, Thickness};
+use super::{Compositing, Counts, Fragments, Order, Switches, Target, Thickness};
 use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Values};
 use crate::gpu::buffers::{Buffer, Chunks};
 use crate::gpu::raster::{self, Readback, Slot, Texture};
 use crate::gpu::shader::{self, Array, Variant};
 use crate::gpu::sort::Sorter;
+use crate::gpu::table::{self, TABLE};
 use crate::gpu::{DeviceChoice, Gpu, Part, arrays, function};
-use crate::integral::Exact;
-use crate::integral::table::{self, Table};
+use crate::integral::{Exact, Lookup};
 use crate::order::depth::{self, HIDDEN, IN_PARTS};
 use crate::view::{Blend, View};
 use bytemuck::{Pod, Zeroable};
+use std::sync::Arc;
 use std::time::Instant;
 use wgpu::{BufferUsages as Usage, ShaderStages as Stages, TextureUsages};
 
@@ -47,9 +48,6 @@ const REPEATED: usize = 2;
 
 /// Cells that are classified at once.
 const CLASSIFIED: usize = 1 << 24;
-
-/// Bytes of a table at most.
-const MOST_TABLE: u64 = 1 << 30;
 
 /// Invocations of a compute group, and groups along one axis at most.
 const GROUP: u32 = 64;
@@ -123,20 +121,10 @@ pub(crate) struct Project {
     program: Option<Program>,
     canvas: Option<(Fragments, [u32; 2], wgpu::TextureFormat, u64, Canvas)>,
     ordered: Option<Ordered>,
-    /// Longest edge of a cell, in normalised units.
-    longest: Option<f64>,
-    table: Option<(Coloring, [u32; 3], Texels, OnDevice)>,
+    table: table::Held,
     sorter: Option<Sorter>,
     /// Whether the device sorts, and not the host.
     sorts: bool,
-}
-
-/// A table, or what takes its place where there is none.
-struct OnDevice {
-    texels: Texture,
-    filter: wgpu::Sampler,
-    /// `Table` in the shader.
-    parameters: Buffer,
 }
 
 impl std::fmt::Debug for Project {
@@ -166,12 +154,12 @@ impl Project {
                 Gpu::open(&DeviceChoice::Named(usable.index.to_string()))?.ok_or_else(|| none("there is none"))?
             }
         };
-        use Slot::{Read, Sampler, Uniform, Volume, Write};
+        use Slot::{Read, Uniform, Write};
         let sorts = gpu.adapter.kind != "CPU";
         let shared = raster::layout(
             &gpu,
             Stages::COMPUTE | Stages::VERTEX_FRAGMENT,
-            &[Uniform, Read, Read, Uniform, Read, Read, Volume, Sampler, Uniform],
+            &[&[Uniform, Read, Read, Uniform, Read, Read], &table::SLOTS[..]].concat(),
         );
         let own = raster::layout(&gpu, Stages::COMPUTE, &[Uniform, Read, Write, Read, Write]);
         let drawn = raster::layout(&gpu, Stages::VERTEX_FRAGMENT, &[Read]);
@@ -187,8 +175,7 @@ impl Project {
             program: None,
             canvas: None,
             ordered: None,
-            longest: None,
-            table: None,
+            table: table::Held::default(),
             sorter: None,
             sorts,
         })
@@ -206,10 +193,10 @@ impl Project {
 
     /// Takes `part` for changed.
     pub(crate) fn forget(&mut self, part: Part) {
-        (self.ordered, self.table) = (None, None);
+        self.ordered = None;
         match part {
-            Part::Mesh => (self.cells, self.points, self.values, self.longest) = (None, None, None, None),
-            Part::Points => (self.points, self.longest) = (None, None),
+            Part::Mesh => (self.cells, self.points, self.values) = (None, None, None),
+            Part::Points => self.points = None,
             Part::Field => self.values = None,
             Part::Function => self.function = None,
         }
@@ -244,7 +231,7 @@ impl Project {
         geometry: &Geometry,
         values: &Values<N>,
         exact: &Exact<f32>,
-        precise: &dyn Fn() -> Exact<f64>,
+        table: Option<&Arc<Lookup>>,
         view: &View,
         switches: &Switches,
     ) -> Result<(Vec<[f32; 4]>, Counts)> {
@@ -254,12 +241,12 @@ impl Project {
         }
         let format = self.format(switches.target)?;
         self.upload(geometry, values, exact)?;
-        self.prepare_table(geometry, precise, switches)?;
+        self.table.prepare(&self.gpu, table)?;
         let association = arrays::association(values);
         let arrays = self.arrays()?;
         let seen = Seen::new(geometry, view);
         let variant = Variant { kind: exact.kind, direct: exact.direct };
-        let source = program(&variant, association, switches, seen.limits(), &arrays);
+        let source = program(&variant, association, switches, table.map(|t| &**t), seen.limits(), &arrays);
         self.compile(&arrays, source, switches.compositing, format)?;
         self.prepare_canvas::<N>(switches.fragments, view.size(), format)?;
         let frame = Pass::new(self, &seen)?;
@@ -342,44 +329,6 @@ impl Project {
         };
         gpu.check()?;
         self.program = Some(program);
-        Ok(())
-    }
-
-    /// Builds and hands over the table that is wanted; without one, the smallest texture that can be bound.
-    fn prepare_table(
-        &mut self,
-        geometry: &Geometry,
-        precise: &dyn Fn() -> Exact<f64>,
-        switches: &Switches,
-    ) -> Result<()> {
-        let Switches { coloring, table: size, texels, .. } = *switches;
-        let same = |t: &(Coloring, [u32; 3], Texels, OnDevice)| {
-            t.0 == coloring && (coloring == Coloring::Exact || (t.1, t.2) == (size, texels))
-        };
-        if self.table.as_ref().is_some_and(same) {
-            return Ok(());
-        }
-        self.table = None;
-        let gpu = &self.gpu;
-        let on_device = match coloring.table() {
-            None => OnDevice::new(gpu, [1; 3], wgpu::TextureFormat::Rgba8Unorm, &[0; 4], [0.0; 8])?,
-            Some(kind) => {
-                let format = texel_format(gpu, texels)?;
-                let longest = *self.longest.get_or_insert_with(|| geometry.longest_edge());
-                let bytes = size.iter().fold(16, |n: u64, &s| n.saturating_mul(u64::from(s)));
-                if bytes > MOST_TABLE {
-                    return Err(Error::Render(format!("a table of {size:?} texels takes {bytes} bytes; choose less")));
-                }
-                let table = Table::new(&precise(), kind, size, longest).ok_or_else(|| {
-                    let what =
-                        "tables are for fields of one component, and have at least 2, 2 and 3 texels along their axes";
-                    Error::Render(format!("{what}; use the exact integral"))
-                })?;
-                OnDevice::holding(gpu, &table, format)?
-            }
-        };
-        gpu.check()?;
-        self.table = Some((coloring, size, texels, on_device));
         Ok(())
     }
 
@@ -665,8 +614,8 @@ impl FilledBinding {
 impl Pass {
     fn new(project: &Project, seen: &Seen) -> Result<Self> {
         let gpu = &project.gpu;
-        let (Some((function, filled)), Some(program), Some((.., table))) =
-            (&project.function, &project.program, &project.table)
+        let (Some((function, filled)), Some(program), Some(table)) =
+            (&project.function, &project.program, project.table.get())
         else {
             return Err(unprepared());
         };
@@ -675,11 +624,7 @@ impl Pass {
             Buffer::holding(gpu, "planes", &seen.planes, Usage::STORAGE)?,
             Buffer::holding(gpu, "ends", &seen.ends, Usage::STORAGE)?,
         ];
-        let shared = function.iter().chain(&buffers).map(|b| b.raw.as_entire_binding()).chain([
-            wgpu::BindingResource::TextureView(&table.texels.view),
-            wgpu::BindingResource::Sampler(&table.filter),
-            table.parameters.raw.as_entire_binding(),
-        ]);
+        let shared = function.iter().chain(&buffers).map(|b| b.raw.as_entire_binding()).chain(table.bindings());
         let arrays = project.chunks()?.into_iter().flat_map(|c| &c.buffers).map(|b| b.raw.as_entire_binding());
         Ok(Pass {
             shared: raster::group(gpu, &project.shared, shared),
@@ -688,73 +633,6 @@ impl Pass {
             _buffers: buffers,
         })
     }
-}
-
-impl OnDevice {
-    fn new(gpu: &Gpu, size: [u32; 3], format: wgpu::TextureFormat, bytes: &[u8], parameters: [f32; 8]) -> Result<Self> {
-        let usage = TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_DST;
-        let texels = Texture::new(gpu, "table", wgpu::TextureDimension::D3, size, format, usage)?;
-        let [width, height, depth] = size;
-        gpu.queue.write_texture(
-            texels.raw.as_image_copy(),
-            bytes,
-            wgpu::TexelCopyBufferLayout {
-                offset: 0,
-                bytes_per_row: Some(width * texel(format) as u32),
-                rows_per_image: Some(height),
-            },
-            wgpu::Extent3d { width, height, depth_or_array_layers: depth },
-        );
-        let filter = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
-            mag_filter: wgpu::FilterMode::Linear,
-            min_filter: wgpu::FilterMode::Linear,
-            ..Default::default()
-        });
-        let parameters = Buffer::holding(gpu, "table", &parameters, Usage::UNIFORM)?;
-        Ok(OnDevice { texels, filter, parameters })
-    }
-
-    fn holding(gpu: &Gpu, table: &Table, format: wgpu::TextureFormat) -> Result<Self> {
-        let greatest = table.greatest();
-        let (scale, bytes) = match format {
-            wgpu::TextureFormat::Rgba32Float => ([1.0; 4], bytemuck::cast_slice(&table.texels).to_vec()),
-            wgpu::TextureFormat::Rgba16Unorm => {
-                let texels: Vec<u16> = shares(table, greatest).map(|v| (v * 65535.0).round() as u16).collect();
-                (greatest, bytemuck::cast_slice(&texels).to_vec())
-            }
-            _ => (greatest, shares(table, greatest).map(|v| (v * 255.0).round() as u8).collect()),
-        };
-        let [w, h, d] = table.size;
-        let step = match table.kind {
-            table::Kind::Uniform => table.longest,
-            table::Kind::Log | table::Kind::LogNormalised => table::length(table.kind, d, table.longest, 1),
-        };
-        let [x, y, z] = [w, h, d].map(|n| n as f32);
-        let [r, g, b, a] = scale;
-        Self::new(gpu, table.size, format, &bytes, [r, g, b, a, x, y, z, step as f32])
-    }
-}
-
-/// All channels of all texels, each over the greatest.
-fn shares(table: &Table, greatest: [f32; 4]) -> impl Iterator<Item = f32> {
-    table.texels.iter().flat_map(move |t| [0, 1, 2, 3].map(|k| t[k] / greatest[k]))
-}
-
-/// The texture format of a table.
-fn texel_format(gpu: &Gpu, texels: Texels) -> Result<wgpu::TextureFormat> {
-    let (format, feature, what) = match texels {
-        Texels::Unorm8 => return Ok(wgpu::TextureFormat::Rgba8Unorm),
-        Texels::Unorm16 => {
-            (wgpu::TextureFormat::Rgba16Unorm, wgpu::Features::TEXTURE_FORMAT_16BIT_NORM, "16-bit textures")
-        }
-        Texels::Float => {
-            (wgpu::TextureFormat::Rgba32Float, wgpu::Features::FLOAT32_FILTERABLE, "filtered 32-bit float textures")
-        }
-    };
-    if gpu.device.features().contains(feature) {
-        return Ok(format);
-    }
-    Err(Error::Device(format!("{} has no {what}; use other texels for the table", gpu.adapter.name)))
 }
 
 impl Ordered {
@@ -862,7 +740,7 @@ fn stride<const N: usize>(form: Fragments) -> u64 {
 fn texel(format: wgpu::TextureFormat) -> usize {
     match format {
         wgpu::TextureFormat::Rgba32Float => 16,
-        wgpu::TextureFormat::Rgba16Float | wgpu::TextureFormat::Rgba16Unorm => 8,
+        wgpu::TextureFormat::Rgba16Float => 8,
         _ => 4,
     }
 }
@@ -885,7 +763,14 @@ fn pixels(bytes: &[u8], format: wgpu::TextureFormat) -> Vec<[f32; 4]> {
 }
 
 /// The whole program.
-fn program(variant: &Variant, association: &str, switches: &Switches, limits: Limits, arrays: &[Array]) -> String {
+fn program(
+    variant: &Variant,
+    association: &str,
+    switches: &Switches,
+    table: Option<&Lookup>,
+    limits: Limits,
+    arrays: &[Array],
+) -> String {
     let mut text = shader::prelude(variant);
     for (name, value) in [("FAR", f64::from(FAR)), ("GROWTH", GROWTH), ("BESIDE", 1e-6)] {
         text += &format!("const {name} = {value:?}f;\n");
@@ -909,14 +794,14 @@ fn program(variant: &Variant, association: &str, switches: &Switches, limits: Li
     text += &format!(
         "const HIDDEN = {HIDDEN}u;\nconst IN_PARTS = {IN_PARTS}u;\nconst FILLED = {FILLED}u;\nconst MOST_WORK = {MOST_WORK}u;\n\
          const INTERSECTED = 0u;\nconst INTERPOLATED = 1u;\nconst LINEAR = 2u;\nconst FORM = {form};\nconst CORNERS = {corners}u;\n\
-         const EXACT = 0u;\nconst UNIFORM = 1u;\nconst LOG = 2u;\nconst LOG_NORMALISED = 3u;\nconst COLORING = {}u;\n\
-         const POINT = 0u;\nconst CORNER = 1u;\nconst CELL = 2u;\nconst ASSOCIATION = {association};\n",
-        switches.coloring as u32
+         const POINT = 0u;\nconst CORNER = 1u;\nconst CELL = 2u;\nconst ASSOCIATION = {association};\n"
     );
     text += arrays::POINT;
     let [records, drawing] = if form == "INTERSECTED" { INTERSECTED } else { INTERPOLATED };
     text += &shader::accessors(arrays);
-    [&text, shader::CELL, shader::INTEGRAL, SHARED, CELLS, records, SHADE, drawing].join("\n")
+    text += &table::constants(table);
+    text += &table::declarations(0, 6);
+    [&text, shader::CELL, shader::INTEGRAL, TABLE, SHARED, CELLS, records, SHADE, drawing].join("\n")
 }
 #[cfg(test)]
 mod tests;

@@ -6,7 +6,7 @@ use crate::cell::{Face, Frame};
 use crate::geometry::boundary::{Beam, Candidate};
 use crate::geometry::{Cell, Geometry, Values};
 use crate::image::Image;
-use crate::integral::{Batch, Exact, Light};
+use crate::integral::{Batch, Integral, Light};
 use crate::mesh::faces::BOUNDARY;
 use crate::view::{Blend, View};
 use glam::DVec2;
@@ -46,7 +46,7 @@ pub struct Counts {
 pub fn render<const N: usize>(
     geometry: &Geometry,
     values: &Values<N>,
-    exact: &Exact<f32>,
+    integral: Integral,
     pixel: &(dyn Fn(&[f32; N]) -> [f32; 4] + Sync),
     view: &View,
     progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
@@ -60,7 +60,7 @@ pub fn render<const N: usize>(
         .par_chunks_mut((w * TILE) as usize)
         .enumerate()
         .map(|(band, rows)| {
-            let mut tracer = Tracer::new(geometry, values, exact, view);
+            let mut tracer = Tracer::new(geometry, values, integral, view);
             if stopped.load(Relaxed) {
                 return tracer.counts;
             }
@@ -84,13 +84,13 @@ pub fn render<const N: usize>(
 pub(crate) fn render_pixels<const N: usize>(
     geometry: &Geometry,
     values: &Values<N>,
-    exact: &Exact<f32>,
+    integral: Integral,
     pixel: &(dyn Fn(&[f32; N]) -> [f32; 4] + Sync),
     view: &View,
     indices: &[usize],
 ) -> Vec<[f32; 4]> {
     let w = view.size()[0];
-    let new = || Tracer::new(geometry, values, exact, view);
+    let new = || Tracer::new(geometry, values, integral, view);
     let draw = |tracer: &mut Tracer<N>, &index: &usize| {
         let (i, j) = ((index % w as usize) as u32, (index / w as usize) as u32);
         tracer.find_candidates([i, j], [i + 1, j + 1]);
@@ -117,7 +117,7 @@ struct Gathered<const N: usize> {
 struct Tracer<'a, const N: usize> {
     geometry: &'a Geometry,
     values: &'a Values<N>,
-    exact: &'a Exact<f32>,
+    integral: Integral<'a>,
     view: &'a View,
     both_ways: bool,
     candidates: Vec<Candidate>,
@@ -127,7 +127,7 @@ struct Tracer<'a, const N: usize> {
 }
 
 impl<'a, const N: usize> Tracer<'a, N> {
-    fn new(geometry: &'a Geometry, values: &'a Values<N>, exact: &'a Exact<f32>, view: &'a View) -> Self {
+    fn new(geometry: &'a Geometry, values: &'a Values<N>, integral: Integral<'a>, view: &'a View) -> Self {
         let [low, high] = geometry.boundary.bounds();
         let both_ways = view.eye().is_some_and(|eye| {
             let eye = (eye - geometry.centre) * geometry.scale;
@@ -136,7 +136,7 @@ impl<'a, const N: usize> Tracer<'a, N> {
         Tracer {
             geometry,
             values,
-            exact,
+            integral,
             view,
             both_ways,
             candidates: vec![],
@@ -271,7 +271,7 @@ impl<'a, const N: usize> Tracer<'a, N> {
                 return false;
             }
         }
-        self.batch.flush(self.exact.direct, &mut gathered.light);
+        self.batch.flush(self.integral.exact.direct, &mut gathered.light);
         true
     }
 
@@ -354,13 +354,16 @@ impl<'a, const N: usize> Tracer<'a, N> {
     /// Whether nothing behind can be seen.
     #[inline(always)]
     fn is_over(&self, gathered: &Gathered<N>) -> bool {
-        gathered.light.through < least_light(self.exact.direct)
+        gathered.light.through < least_light(self.integral.exact.direct)
     }
 
     #[inline(always)]
     fn gather(&mut self, front: [f32; N], back: [f32; N], length: f64, gathered: &mut Gathered<N>) {
         if self.view.blend() == Blend::Composite {
-            self.batch.add(self.exact, &front, &back, length as f32, &mut gathered.light);
+            match self.integral.table {
+                None => self.batch.add(self.integral.exact, &front, &back, length as f32, &mut gathered.light),
+                Some(table) => table.add(front[N - 1], back[N - 1], length as f32, &mut gathered.light),
+            }
         } else if front.iter().chain(&back).all(|v| v.is_finite()) {
             for v in [front, back] {
                 if gathered.largest.is_none_or(|l| v[N - 1] > l[N - 1]) {

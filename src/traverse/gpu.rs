@@ -7,8 +7,9 @@ use crate::geometry::{Cell, Geometry, Values};
 use crate::gpu::buffers::{Buffer, Chunks};
 use crate::gpu::function;
 use crate::gpu::shader::{self, Array, Binding, Variant};
-use crate::gpu::{Gpu, Part, arrays};
-use crate::integral::Exact;
+use crate::gpu::table::{self, TABLE};
+use crate::gpu::{Gpu, Part, arrays, raster};
+use crate::integral::{Exact, Lookup};
 use crate::mesh::faces::BOUNDARY;
 use crate::view::{Blend, Fan, View};
 use bytemuck::{Pod, Zeroable};
@@ -19,6 +20,11 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use wgpu::BufferUsages as Usage;
 
 const TRAVERSE: &str = include_str!("../../shaders/traverse.wgsl");
+
+/// How a segment joins the light before it.
+const ADD_EXACT: &str = "fn add(front: Value, back: Value, length: f32) { add_segment(front, back, length); }\n";
+const ADD_TABULATED: &str =
+    "fn add(front: Value, back: Value, length: f32) { add_tabulated(last_of(front), last_of(back), length); }\n";
 
 /// Rays of one dispatch at most: a driver ends work that takes seconds.
 const RAYS: u64 = 1 << 21;
@@ -113,13 +119,18 @@ pub(crate) struct Traverse {
     values: Option<Chunks>,
     function: Option<[Buffer; 3]>,
     program: Option<(String, wgpu::ComputePipeline, wgpu::BindGroupLayout)>,
+    /// Tables have a group of their own, in programs that read them.
+    tables: wgpu::BindGroupLayout,
+    table: table::Held,
 }
 
 impl Traverse {
     pub(crate) fn new(gpu: Gpu) -> Self {
         use Binding::{Read, Uniform, Write};
         let layout = shader::group_layout(&gpu, &[Uniform, Read, Read, Uniform, Read, Read, Write, Write]);
-        Traverse { gpu, layout, cells: None, points: None, values: None, function: None, program: None }
+        let tables = raster::layout(&gpu, wgpu::ShaderStages::COMPUTE, &table::SLOTS);
+        let table = table::Held::default();
+        Traverse { gpu, layout, cells: None, points: None, values: None, function: None, program: None, tables, table }
     }
 
     pub(crate) fn gpu(&self) -> &Gpu {
@@ -177,21 +188,27 @@ impl Traverse {
         geometry: &Geometry,
         values: &Values<N>,
         exact: &Exact<f32>,
+        table: Option<&Arc<Lookup>>,
         view: &View,
     ) -> Result<Drawn> {
         self.upload(geometry, values, exact)?;
+        self.table.prepare(&self.gpu, table)?;
         let association = arrays::association(values);
         let arrays = self.arrays()?;
         let variant = Variant { kind: exact.kind, direct: exact.direct };
-        let source = program(&variant, association, view.blend(), &arrays);
+        let source = program(&variant, association, view.blend(), table.map(|t| &**t), &arrays);
         if self.program.as_ref().is_none_or(|p| p.0 != source) {
             let bindings = arrays.iter().map(|a| a.chunks).sum();
             let layout = shader::group_layout(&self.gpu, &vec![Binding::Read; bindings]);
-            let pipeline = shader::compile(&self.gpu, "traverse", &source, &[&self.layout, &layout]);
+            let pipeline = {
+                let tables = table.is_some().then_some(&self.tables);
+                let layouts: Vec<_> = [&self.layout, &layout].into_iter().chain(tables).collect();
+                shader::compile(&self.gpu, "traverse", &source, &layouts)
+            };
             self.gpu.check()?;
             self.program = Some((source, pipeline, layout));
         }
-        self.draw(geometry, view)
+        self.draw(geometry, table.is_some(), view)
     }
 
     /// The pixels whose rays the device did not finish, as indices.
@@ -232,7 +249,7 @@ impl Traverse {
         }
     }
 
-    fn draw(&self, geometry: &Geometry, view: &View) -> Result<Drawn> {
+    fn draw(&self, geometry: &Geometry, tabulated: bool, view: &View) -> Result<Drawn> {
         let gpu = &self.gpu;
         let (Some(function), Some((_, pipeline, group_layout))) = (&self.function, &self.program) else {
             return Err(Error::Render("the device does not hold the transfer function".into()));
@@ -276,6 +293,8 @@ impl Traverse {
         let own = [parameters, knots, buckets, &frame_buffer, &planes, &ends, &pixels, &counts];
         let own = shader::group(gpu, &self.layout, own);
         let shared = shader::group(gpu, group_layout, self.chunks()?.into_iter().flat_map(|c| &c.buffers));
+        let tables = self.table.get().filter(|_| tabulated);
+        let tables = tables.map(|t| raster::group(gpu, &self.tables, t.bindings()));
         let clock = Clock::new(gpu)?;
 
         let mut drawn =
@@ -293,6 +312,9 @@ impl Traverse {
                 pass.set_pipeline(pipeline);
                 pass.set_bind_group(0, &own, &[]);
                 pass.set_bind_group(1, &shared, &[]);
+                if let Some(tables) = &tables {
+                    pass.set_bind_group(2, tables, &[]);
+                }
                 pass.dispatch_workgroups(w.div_ceil(8), rows.div_ceil(8), 1);
             }
             encoder.copy_buffer_to_buffer(&pixels.raw, 0, &back.raw, 0, size);
@@ -359,7 +381,7 @@ impl Clock {
 }
 
 /// The whole program.
-fn program(variant: &Variant, association: &str, blend: Blend, arrays: &[Array]) -> String {
+fn program(variant: &Variant, association: &str, blend: Blend, table: Option<&Lookup>, arrays: &[Array]) -> String {
     let mut text = shader::prelude(variant);
     for (name, value) in [
         ("FAR", f64::from(FAR)),
@@ -380,7 +402,14 @@ fn program(variant: &Variant, association: &str, blend: Blend, arrays: &[Array])
     text += &format!("const ASSOCIATION = {association};\n\n");
     text += arrays::POINT;
     text += &shader::accessors(arrays);
-    [&text, shader::CELL, shader::INTEGRAL, TRAVERSE].join("\n")
+    if table.is_none() {
+        text += ADD_EXACT;
+        return [&text, shader::CELL, shader::INTEGRAL, TRAVERSE].join("\n");
+    }
+    text += ADD_TABULATED;
+    text += &table::constants(table);
+    text += &table::declarations(2, 0);
+    [&text, shader::CELL, shader::INTEGRAL, TABLE, TRAVERSE].join("\n")
 }
 
 /// Where a depth buffer ends each pixel's ray, as the shader counts t; empty without one.

@@ -5,6 +5,7 @@ mod camera;
 mod choose;
 mod demo;
 mod info;
+mod integral;
 mod output;
 mod parse;
 mod progress;

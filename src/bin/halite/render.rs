@@ -1,9 +1,10 @@
-use crate::{camera, choose, output, parse, progress, variant};
+use crate::{camera, choose, integral, output, parse, progress, variant};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use halite::field::{Association, Component, Field};
 use halite::gpu::DeviceChoice;
 use halite::image::{Backdrop, Image};
+use halite::integral::Choice;
 use halite::mesh::{Mesh, cells, cells::Tetrahedra};
 use halite::project::Switches;
 use halite::render::{self, Renderer, Stats};
@@ -81,9 +82,8 @@ pub(crate) struct Request {
     /// Where the work is done: auto, cpu, or a device's index, UUID or part of its name; HALITE_DEVICE overrides auto
     #[arg(long, value_name = "DEVICE", help_heading = "Engine")]
     device: Option<String>,
-    /// How a ray is integrated in a cell
-    #[arg(long, help_heading = "Engine")]
-    integral: Option<Integral>,
+    #[command(flatten)]
+    integral: integral::Integral,
     #[command(flatten)]
     variant: variant::Variant,
 }
@@ -115,11 +115,6 @@ impl From<Engine> for render::Engine {
             Engine::Project => render::Engine::Project,
         }
     }
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum Integral {
-    Exact,
 }
 
 pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
@@ -219,7 +214,14 @@ impl Request {
         let mut renderer = Renderer::with_engine(threads, device, engine)?;
         let switches = scene.map_or(Ok(Switches::default()), |s| variant::of_scene(s, &self.input))?;
         renderer.set_switches(self.variant.apply(switches));
+        renderer.set_integral(self.choice(scene)?);
         Ok(renderer)
+    }
+
+    /// The form of the integral that was asked for.
+    pub(crate) fn choice(&self, scene: Option<&Scene>) -> Result<Choice> {
+        let choice = scene.map_or(Ok(Choice::default()), |s| integral::of_scene(s, &self.input))?;
+        Ok(self.integral.apply(choice))
     }
 
     fn scalars(&self, scene: Option<&Scene>, mesh: &Mesh) -> Result<Scalars> {
@@ -293,10 +295,6 @@ fn check_engine(scene: &Scene) -> Result<()> {
     if let Some(name) = &scene.engine {
         check::<Engine>("engine", name)?;
     }
-    let text = |v: &serde_json::Value| v.as_str().map_or_else(|| v.to_string(), str::to_owned);
-    if let Some(integral) = &scene.integral {
-        check::<Integral>("integral", &text(integral))?;
-    }
     Ok(())
 }
 
@@ -360,6 +358,7 @@ pub(crate) fn report(s: &Stats, times: &Times, size: [u32; 2], frame_ms: f64) ->
         "size": size, "cells": s.cells, "tetrahedra": s.tetrahedra,
         "load_ms": times.load, "faces_ms": times.split + s.faces_ms, "upload_ms": s.upload_ms,
         "first_frame_ms": times.first_frame, "frame_ms": frame_ms, "transfer_edit_ms": times.transfer_edit,
+        "integral": s.integral, "table_ms": s.table_ms, "table_bytes": s.table_bytes, "knots_per_cell": s.knots_per_cell,
         "steps": s.steps, "repaired_rays": s.repaired_rays, "cpu_rays": s.cpu_rays,
         "device_ms": s.device_ms, "uploaded_bytes": s.uploaded_bytes, "device_bytes": s.device_bytes,
         "peak_bytes": peak_bytes(), "projection": s.projection,

@@ -8,7 +8,9 @@ use embedded_graphics::prelude::{DrawTarget, Drawable, OriginDimensions, Pixel, 
 use embedded_graphics::text::{Baseline, Text};
 use halite::gpu::DeviceChoice;
 use halite::image::{Backdrop, Image};
-use halite::project::{Coloring, Fragments, Order, Switches, Target, Texels, Thickness};
+use halite::integral::choice::{Choice, Form, Texels};
+use halite::integral::table::Kind;
+use halite::project::{Fragments, Order, Switches, Target, Thickness};
 use halite::render::Renderer;
 use halite::view::View;
 use serde_json::json;
@@ -41,6 +43,7 @@ struct Variant {
     name: &'static str,
     place: &'static str,
     switches: Switches,
+    integral: Choice,
 }
 
 /// What a variant gave.
@@ -68,36 +71,32 @@ const LINES: usize = 24;
 /// From the fewest enhancements to the most, then what else can be switched.
 fn variants() -> Vec<Variant> {
     let best = Switches::default();
-    let published =
-        Switches { fragments: Fragments::Interpolated, coloring: Coloring::Log, texels: Texels::Unorm16, ..best };
-    let basic = Switches {
-        fragments: Fragments::Linear,
-        coloring: Coloring::Uniform,
-        texels: Texels::Unorm8,
-        target: Target::Rgba8,
-        ..best
-    };
-    let frame_buffer = Switches { target: Target::Rgba8, ..published };
+    let volume = |lengths, texels| Choice { lengths, texels, table: Some([256, 256, 16]), ..Choice::of(Form::Volume) };
+    let (uniform, log) = (volume(Kind::Uniform, Texels::Unorm16), volume(Kind::Log, Texels::Unorm16));
     let interpolated = Switches { fragments: Fragments::Interpolated, ..best };
-    let variant = |name, place, switches| Variant { name, place, switches };
+    let linear = Switches { fragments: Fragments::Linear, ..best };
+    let eight = |switches| Switches { target: Target::Rgba8, ..switches };
+    let frame_buffer = eight(interpolated);
+    let exact = Choice::default();
+    let variant = |name, place, switches, integral| Variant { name, place, switches, integral };
     vec![
-        variant("basic", "table 1 i", basic),
-        variant("+ perspective", "table 1 ii", Switches { fragments: Fragments::Interpolated, ..basic }),
-        variant("+ 16-bit table", "table 1 iii", Switches { coloring: Coloring::Uniform, ..frame_buffer }),
-        variant("+ logarithmic", "table 1 iv, figure 9a", frame_buffer),
-        variant("+ alpha dithering", "table 1, figure 9b", Switches { dither: true, ..frame_buffer }),
-        variant("+ 32-bit float target", "table 1, figures 7c 8b 9c 10b", published),
-        variant("16-bit float target", "", Switches { target: Target::Rgba16float, ..published }),
-        variant("8-bit table", "figure 7a", Switches { texels: Texels::Unorm8, ..published }),
-        variant("8-bit target", "figure 7b", frame_buffer),
-        variant("screen-linear", "figure 8a", Switches { fragments: Fragments::Linear, ..published }),
-        variant("thickness by depth", "", Switches { thickness: Thickness::Depth, ..published }),
-        variant("uniform thickness", "figure 10a", Switches { coloring: Coloring::Uniform, ..published }),
-        variant("log-normalised, float", "", Switches { coloring: Coloring::LogNormalised, ..interpolated }),
-        variant("interpolated, exact", "", interpolated),
-        variant("intersected, exact", "", best),
-        variant("by circumspheres", "", Switches { order: Order::Circumsphere, ..best }),
-        variant("not sorted", "", Switches { order: Order::None, ..best }),
+        variant("basic", "table 1 i", eight(linear), volume(Kind::Uniform, Texels::Unorm8)),
+        variant("+ perspective", "table 1 ii", frame_buffer, volume(Kind::Uniform, Texels::Unorm8)),
+        variant("+ 16-bit table", "table 1 iii", frame_buffer, uniform),
+        variant("+ logarithmic", "table 1 iv, figure 9a", frame_buffer, log),
+        variant("+ alpha dithering", "table 1, figure 9b", Switches { dither: true, ..frame_buffer }, log),
+        variant("+ 32-bit float target", "table 1, figures 7c 8b 9c 10b", interpolated, log),
+        variant("16-bit float target", "", Switches { target: Target::Rgba16float, ..interpolated }, log),
+        variant("8-bit table", "figure 7a", interpolated, volume(Kind::Log, Texels::Unorm8)),
+        variant("8-bit target", "figure 7b", frame_buffer, log),
+        variant("screen-linear", "figure 8a", linear, log),
+        variant("thickness by depth", "", Switches { thickness: Thickness::Depth, ..interpolated }, log),
+        variant("uniform thickness", "figure 10a", interpolated, uniform),
+        variant("log-normalised, float", "", interpolated, volume(Kind::LogNormalised, Texels::Float)),
+        variant("interpolated, exact", "", interpolated, exact),
+        variant("intersected, exact", "", best, exact),
+        variant("by circumspheres", "", Switches { order: Order::Circumsphere, ..best }, exact),
+        variant("not sorted", "", Switches { order: Order::None, ..best }, exact),
     ]
 }
 
@@ -141,6 +140,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
             .map(|r| {
                 json!({
                     "variant": r.variant.name, "stands_in": r.variant.place, "switches": r.variant.switches,
+                    "integral": r.variant.integral,
                     "max": r.max, "rmse": r.rmse, "order_ms": r.order_ms, "project_ms": r.project_ms, "frame_ms": r.frame_ms,
                     "drawn_cells": r.cells, "fragments": r.fragments, "tetrahedra_per_s": r.rate(tetrahedra),
                 })
@@ -162,6 +162,7 @@ fn set(renderer: &mut Renderer, job: &Job) -> halite::Result<()> {
 }
 
 fn draw(variant: Variant, frames: u32, renderer: &mut Renderer, view: &View, truth: &Image) -> halite::Result<Row> {
+    renderer.set_integral(variant.integral);
     // Whatever the last variant left: each sorts for itself.
     renderer.set_switches(Switches { order: Order::None, fragments: Fragments::Intersected, ..variant.switches });
     if variant.switches.order != Order::None {

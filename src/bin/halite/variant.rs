@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result};
 use clap::Args;
-use halite::project::{Coloring, Compositing, Fragments, Order, Switches, Target, Texels, Thickness};
+use halite::project::{Compositing, Fragments, Order, Switches, Target, Thickness};
 use halite::scene::Scene;
 use serde::de::{DeserializeOwned, IntoDeserializer};
 use std::path::Path;
@@ -28,15 +28,6 @@ pub(crate) struct Variant {
     /// How a cell joins what lies behind it: over, or additive
     #[arg(long, value_name = "KIND", value_parser = named::<Compositing>, help_heading = "Projection engine")]
     compositing: Option<Compositing>,
-    /// Where colour and opacity come from: exact, or a table: uniform, log or log-normalised
-    #[arg(long, value_name = "KIND", value_parser = named::<Coloring>, help_heading = "Projection engine")]
-    coloring: Option<Coloring>,
-    /// Values in front, values behind and lengths of the table [default: 256x256x16]
-    #[arg(long, value_name = "NxNxN", value_parser = table, help_heading = "Projection engine")]
-    table: Option<[u32; 3]>,
-    /// What the table's texels are: float, unorm16 or unorm8
-    #[arg(long, value_name = "FORMAT", value_parser = named::<Texels>, help_heading = "Projection engine")]
-    texels: Option<Texels>,
 }
 
 impl Variant {
@@ -49,9 +40,6 @@ impl Variant {
             target: self.target.unwrap_or(switches.target),
             dither: self.dither || switches.dither,
             compositing: self.compositing.unwrap_or(switches.compositing),
-            coloring: self.coloring.unwrap_or(switches.coloring),
-            table: self.table.unwrap_or(switches.table),
-            texels: self.texels.unwrap_or(switches.texels),
         }
     }
 }
@@ -63,13 +51,17 @@ pub(crate) fn of_scene(scene: &Scene, path: &Path) -> Result<Switches> {
 }
 
 /// A variant by the name that scenes know it by.
-fn named<T: DeserializeOwned>(text: &str) -> Result<T, String> {
+pub(crate) fn named<T: DeserializeOwned>(text: &str) -> Result<T, String> {
     let text: serde::de::value::StrDeserializer<serde::de::value::Error> = text.into_deserializer();
     T::deserialize(text).map_err(|e| e.to_string())
 }
 
-/// `NxNxN`
-fn table(text: &str) -> Result<[u32; 3], String> {
+/// `NxN` or `NxNxN`; the third is 0 in the first, which only polynomials are.
+pub(crate) fn table(text: &str) -> Result<[u32; 3], String> {
     let parts: Result<Vec<u32>, _> = text.split('x').map(str::parse).collect();
-    parts.ok().and_then(|p| p.try_into().ok()).ok_or_else(|| "the size is three numbers, such as 256x256x16".into())
+    match parts.as_deref() {
+        Ok([a, b]) => Ok([*a, *b, 0]),
+        Ok([a, b, c]) => Ok([*a, *b, *c]),
+        _ => Err("the size is two or three numbers, such as 256x256x16".into()),
+    }
 }

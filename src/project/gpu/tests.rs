@@ -3,9 +3,10 @@
 use super::*;
 use crate::field::{Association, Component, Field, Kind};
 use crate::gpu::testing::{gpu, validated};
+use crate::integral::lookup::tests::{choices, exact};
 use crate::mesh::{cells::Tetrahedra, generate};
 use crate::render::{Engine, Renderer};
-use crate::transfer::TransferFunction;
+use crate::transfer::{Emission, TransferFunction};
 use crate::view::{Camera, Projection};
 use glam::{DVec3, dvec3};
 use wgpu::naga;
@@ -23,25 +24,21 @@ fn every_program_is_valid() {
     for kind in KINDS {
         for fragments in FORMS {
             for (direct, chunks, association) in [(false, 1, "POINT"), (true, 3, "CORNER"), (false, 2, "CELL")] {
-                let kind_of = |coloring| match kind {
-                    Kind::Scalar => coloring,
-                    _ => Coloring::Exact,
-                };
-                for (coloring, compositing) in [
-                    (Coloring::Exact, Compositing::Over),
-                    (Coloring::Uniform, Compositing::Additive),
-                    (Coloring::LogNormalised, Compositing::Over),
-                ] {
+                // Fields of several components have no tables.
+                let tables = choices().into_iter().filter(|_| kind == Kind::Scalar);
+                let tables = tables.map(|c| Some(Lookup::new(&exact(Emission::Chromatic), &c, 2.0).unwrap()));
+                for (i, table) in [None].into_iter().chain(tables).enumerate() {
                     let switches = Switches {
                         fragments,
-                        coloring: kind_of(coloring),
-                        compositing,
+                        compositing: if i % 3 == 1 { Compositing::Additive } else { Compositing::Over },
                         dither: true,
                         target: Target::Rgba8,
                         ..Switches::default()
                     };
                     let limits = Limits { ends: direct, planes: chunks > 1 };
-                    validated(&program(&Variant { kind, direct }, association, &switches, limits, &arrays(chunks)));
+                    let variant = Variant { kind, direct };
+                    let arrays = arrays(chunks);
+                    validated(&program(&variant, association, &switches, table.as_ref(), limits, &arrays));
                 }
             }
         }
@@ -57,6 +54,7 @@ fn layouts_match_their_rust_twins() {
                 &Variant { kind, direct: false },
                 "POINT",
                 &switches,
+                None,
                 Limits::default(),
                 &arrays(1),
             ));
@@ -75,7 +73,6 @@ fn layouts_match_their_rust_twins() {
                 ("Frame", size_of::<Frame>() as u64),
                 ("Part", size_of::<Slice>() as u64),
                 ("Point", 24),
-                ("Table", 32),
             ];
             for (name, size) in rust {
                 assert_eq!(span(name), size, "{name}, {kind:?}, {fragments:?}");

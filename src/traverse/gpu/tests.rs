@@ -69,7 +69,7 @@ fn every_program_is_valid() {
         for (direct, chunks) in [(false, 1), (true, 3)] {
             for association in ["POINT", "CORNER", "CELL"] {
                 for blend in [Blend::Composite, Blend::Maximum] {
-                    validated(&program(&Variant { kind, direct }, association, blend, &arrays(chunks)));
+                    validated(&program(&Variant { kind, direct }, association, blend, None, &arrays(chunks)));
                 }
             }
         }
@@ -80,7 +80,7 @@ fn every_program_is_valid() {
 fn layouts_match_their_rust_twins() {
     use std::mem::offset_of;
     let variant = Variant { kind: Kind::Scalar, direct: false };
-    let module = validated(&program(&variant, "POINT", Blend::Composite, &arrays(1)));
+    let module = validated(&program(&variant, "POINT", Blend::Composite, None, &arrays(1)));
     let check = |name: &str, size: usize, offsets: &[usize]| {
         let (_, t) = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name)).unwrap();
         let naga::TypeInner::Struct { members, span } = &t.inner else { panic!("{name} is no struct") };

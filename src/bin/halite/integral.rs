@@ -1,0 +1,70 @@
+//! The form of the ray integral, as options and in scenes.
+
+use crate::variant::{named, table};
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use halite::integral::choice::{Alpha, Choice, Form, Planes, Texels};
+use halite::integral::table::Kind;
+use halite::scene::Scene;
+use serde_json::Value;
+use std::path::Path;
+
+/// What of the integral's form somebody said.
+#[derive(Args)]
+pub(crate) struct Integral {
+    /// How a ray is integrated in a cell: auto, exact, or by a table: volume, polynomial or cylindrical
+    #[arg(long, value_name = "FORM", value_parser = named::<Form>, help_heading = "Integral")]
+    integral: Option<Form>,
+    /// Texels of the table: values in front, values behind, and lengths (volume) or planes (cylindrical)
+    #[arg(long, value_name = "NxN[xN]", value_parser = table, help_heading = "Integral")]
+    table: Option<[u32; 3]>,
+    /// Lengths of a volume: uniform, log, or log-normalised
+    #[arg(long, value_name = "KIND", value_parser = named::<Kind>, help_heading = "Integral")]
+    lengths: Option<Kind>,
+    /// Degree of polynomials, 1 to 8 [default: 2]
+    #[arg(long, value_name = "N", help_heading = "Integral")]
+    degree: Option<u32>,
+    /// How the opacity of polynomials depends on the length: exponential, or linear
+    #[arg(long, value_name = "KIND", value_parser = named::<Alpha>, help_heading = "Integral")]
+    alpha: Option<Alpha>,
+    /// Which planes of a cylinder are read: two, one, or packed (two, stored in less room)
+    #[arg(long, value_name = "KIND", value_parser = named::<Planes>, help_heading = "Integral")]
+    planes: Option<Planes>,
+    /// Read one pair of a cylinder's planes in each interpolated cell, as parallel views always do
+    #[arg(long, help_heading = "Integral")]
+    plane_per_cell: bool,
+    /// What the table's texels are: float, unorm16 or unorm8
+    #[arg(long, value_name = "FORMAT", value_parser = named::<Texels>, help_heading = "Integral")]
+    texels: Option<Texels>,
+}
+
+impl Integral {
+    /// `choice`, with what was said in its place.
+    pub(crate) fn apply(&self, choice: Choice) -> Choice {
+        Choice {
+            form: self.integral.unwrap_or(choice.form),
+            table: self.table.or(choice.table),
+            lengths: self.lengths.unwrap_or(choice.lengths),
+            degree: self.degree.unwrap_or(choice.degree),
+            alpha: self.alpha.unwrap_or(choice.alpha),
+            planes: self.planes.unwrap_or(choice.planes),
+            per_cell: self.plane_per_cell || choice.per_cell,
+            texels: self.texels.unwrap_or(choice.texels),
+        }
+    }
+}
+
+/// A scene's "integral": the name of a form, or an object.
+pub(crate) fn of_scene(scene: &Scene, path: &Path) -> Result<Choice> {
+    match &scene.integral {
+        None => Ok(Choice::default()),
+        Some(Value::String(name)) => match Form::ALL.into_iter().find(|f| f.0 == name.as_str()) {
+            Some((_, form)) => Ok(Choice::of(form)),
+            None => {
+                let known = Form::ALL.map(|f| f.0).join(", ");
+                bail!("{}: integral: \"{name}\" is not known here; there is {known}", path.display())
+            }
+        },
+        Some(value) => serde_path_to_error::deserialize(value).with_context(|| format!("{}: integral", path.display())),
+    }
+}

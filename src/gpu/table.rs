@@ -1,0 +1,338 @@
+//! Pre-integrated tables on a device, as `shaders/table.wgsl` reads them.
+
+use super::Gpu;
+use super::buffers::Buffer;
+use super::raster::{Slot, Texture};
+use crate::error::{Error, Result};
+use crate::integral::Lookup;
+use crate::integral::choice::{Alpha, Planes, Texels};
+use crate::integral::lookup::{Range, Stored};
+use crate::integral::table::{Cylindrical, Kind, length};
+use bytemuck::{Pod, Zeroable};
+use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
+use wgpu::{BufferUsages as Usage, TextureDimension, TextureFormat, TextureUsages};
+
+pub(crate) const TABLE: &str = include_str!("../../shaders/table.wgsl");
+
+/// What a program binds to look tables up, in the order of [`declarations`].
+pub(crate) const SLOTS: [Slot; 4] = [Slot::Volume, Slot::Layers, Slot::Sampler, Slot::Uniform];
+
+/// Powers of a polynomial at most.
+const POWERS: usize = 9;
+
+/// Columns of a tile with two triangles besides those of a plane, so that a filter on one reads nothing of the other.
+const GAP: u32 = 3;
+
+/// Bytes that are handed over at once.
+const AT_ONCE: u64 = 64 << 20;
+
+/// The bindings of a table, from `first` on in `group`.
+pub(crate) fn declarations(group: u32, first: u32) -> String {
+    let names = [
+        "var table_volume: texture_3d<f32>",
+        "var table_layers: texture_2d_array<f32>",
+        "var table_filter: sampler",
+        "var<uniform> table: Table",
+    ];
+    (first..).zip(names).map(|(binding, name)| format!("@group({group}) @binding({binding}) {name};\n")).collect()
+}
+
+/// The constants that a program with this table is compiled for.
+pub(crate) fn constants(table: Option<&Lookup>) -> String {
+    let mut text = String::new();
+    let forms = ["EXACT", "UNIFORM", "LOG", "LOG_NORMALISED", "POLYNOMIAL", "CYLINDRICAL"];
+    for (i, form) in forms.iter().enumerate() {
+        text += &format!("const {form} = {i}u;\n");
+    }
+    let form = match table.map(Lookup::stored) {
+        None => "EXACT",
+        Some(Stored::Volume(t)) => match t.kind {
+            Kind::Uniform => "UNIFORM",
+            Kind::Log => "LOG",
+            Kind::LogNormalised => "LOG_NORMALISED",
+        },
+        Some(Stored::Polynomial(_)) => "POLYNOMIAL",
+        Some(Stored::Cylindrical(_)) => "CYLINDRICAL",
+    };
+    let choice = table.map(|t| *t.choice()).unwrap_or_default();
+    text += &format!(
+        "const COLORING = {form};\nconst DEGREE = {}u;\nconst LINEAR_OPACITY = {};\nconst ONE_PLANE = {};\nconst PACKED = {};\n",
+        choice.degree,
+        choice.alpha == Alpha::Linear && form == "POLYNOMIAL",
+        choice.planes == Planes::One,
+        choice.planes == Planes::Packed,
+    );
+    text
+}
+
+/// `Table` in the shader.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Parameters {
+    size: [f32; 4],
+    tiles: [f32; 4],
+    span: [[f32; 4]; POWERS],
+    least: [[f32; 4]; POWERS],
+}
+
+/// A table, or what takes its place where there is none.
+#[derive(Debug)]
+pub(crate) struct OnDevice {
+    volume: Texture,
+    layers: (Texture, wgpu::TextureView),
+    filter: wgpu::Sampler,
+    parameters: Buffer,
+}
+
+/// The table that a device holds, and its twin on the host.
+#[derive(Debug, Default)]
+pub(crate) struct Held(Option<(Option<Arc<Lookup>>, OnDevice)>);
+
+impl Held {
+    /// Hands over `table` unless it is there; without one, the smallest that can be bound.
+    ///
+    /// # Errors
+    /// Those of [`OnDevice::holding`].
+    pub(crate) fn prepare(&mut self, gpu: &Gpu, table: Option<&Arc<Lookup>>) -> Result<()> {
+        let same = |(held, _): &(Option<Arc<Lookup>>, OnDevice)| match (held, table) {
+            (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+            (None, None) => true,
+            _ => false,
+        };
+        if self.0.as_ref().is_none_or(|h| !same(h)) {
+            // The old one's memory first.
+            self.0 = None;
+            let on_device = match table {
+                None => OnDevice::none(gpu)?,
+                Some(table) => OnDevice::holding(gpu, table)?,
+            };
+            self.0 = Some((table.cloned(), on_device));
+        }
+        Ok(())
+    }
+
+    /// What was prepared last.
+    pub(crate) fn get(&self) -> Option<&OnDevice> {
+        self.0.as_ref().map(|h| &h.1)
+    }
+}
+
+impl OnDevice {
+    /// The smallest that can be bound.
+    fn none(gpu: &Gpu) -> Result<Self> {
+        let format = TextureFormat::Rgba8Unorm;
+        let (volume, layers) =
+            (texture(gpu, TextureDimension::D3, [1; 3], format)?, texture(gpu, TextureDimension::D2, [1; 3], format)?);
+        Self::new(gpu, volume, layers, Parameters::zeroed())
+    }
+
+    fn new(gpu: &Gpu, volume: Texture, layers: Texture, parameters: Parameters) -> Result<Self> {
+        let filter = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+            mag_filter: wgpu::FilterMode::Linear,
+            min_filter: wgpu::FilterMode::Linear,
+            ..Default::default()
+        });
+        let view = layers.raw.create_view(&wgpu::TextureViewDescriptor {
+            dimension: Some(wgpu::TextureViewDimension::D2Array),
+            ..Default::default()
+        });
+        let parameters = Buffer::holding(gpu, "table", &[parameters], Usage::UNIFORM)?;
+        gpu.check()?;
+        Ok(OnDevice { volume, layers: (layers, view), filter, parameters })
+    }
+
+    /// Hands `table` over.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device does not filter such texels or has no textures so large, and those of [`Gpu::check`] and
+    /// [`Buffer::new`].
+    pub(crate) fn holding(gpu: &Gpu, table: &Lookup) -> Result<Self> {
+        let format = texel_format(gpu, table.choice().texels)?;
+        let ([x, y, z], longest) = (table.size().map(|n| n as f32), table.longest() as f32);
+        let mut parameters = Parameters { size: [x, y, z, longest], ..Parameters::zeroed() };
+        for (i, range) in table.ranges().iter().enumerate().take(POWERS) {
+            (parameters.span[i], parameters.least[i]) = (range.span, range.least);
+        }
+        let small = TextureFormat::Rgba8Unorm;
+        let mut writer = Writer { gpu, format, pending: 0 };
+        let (volume, layers) = match table.stored() {
+            Stored::Volume(t) => {
+                if t.kind != Kind::Uniform {
+                    parameters.size[3] = length(t.kind, t.size[2], t.longest, 1) as f32;
+                }
+                let volume = texture(gpu, TextureDimension::D3, t.size, format)?;
+                let [w, h, _] = t.size;
+                for (z, slice) in (0..).zip(t.texels.chunks((w * h) as usize)) {
+                    writer.write(&volume, [0, 0, z], [w, h], slice, &table.ranges()[0])?;
+                }
+                (volume, texture(gpu, TextureDimension::D2, [1; 3], small)?)
+            }
+            Stored::Polynomial(t) => {
+                let layers = texture(gpu, TextureDimension::D2, [t.size, t.size, t.degree + 1], format)?;
+                for (power, (texels, range)) in (0..).zip(t.texels.iter().zip(table.ranges())) {
+                    writer.write(&layers, [0, 0, power], [t.size; 2], texels, range)?;
+                }
+                (texture(gpu, TextureDimension::D3, [1; 3], small)?, layers)
+            }
+            Stored::Cylindrical(t) => {
+                let tiles = Tiles::new(gpu, t, table.choice().planes == Planes::Packed);
+                parameters.tiles = tiles.parameters();
+                let layers = texture(gpu, TextureDimension::D2, tiles.size(), format)?;
+                for tile in 0..tiles.count {
+                    let texels = tiles.texels(t, tile);
+                    writer.write(&layers, tiles.corner(tile), tiles.tile, &texels, &table.ranges()[0])?;
+                }
+                (texture(gpu, TextureDimension::D3, [1; 3], small)?, layers)
+            }
+        };
+        Self::new(gpu, volume, layers, parameters)
+    }
+
+    /// What to bind, as [`SLOTS`] say.
+    pub(crate) fn bindings(&self) -> [wgpu::BindingResource<'_>; SLOTS.len()] {
+        [
+            wgpu::BindingResource::TextureView(&self.volume.view),
+            wgpu::BindingResource::TextureView(&self.layers.1),
+            wgpu::BindingResource::Sampler(&self.filter),
+            self.parameters.raw.as_entire_binding(),
+        ]
+    }
+}
+
+fn texture(gpu: &Gpu, dimension: TextureDimension, size: [u32; 3], format: TextureFormat) -> Result<Texture> {
+    let most = gpu.device.limits().max_texture_array_layers;
+    if dimension == TextureDimension::D2 && size[2] > most {
+        let name = &gpu.adapter.name;
+        return Err(Error::Device(format!(
+            "{name} has no table of {} layers, but of {most} at most; use fewer planes",
+            size[2]
+        )));
+    }
+    Texture::new(gpu, "table", dimension, size, format, TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_DST)
+}
+
+/// Hands texels over, some at a time.
+struct Writer<'a> {
+    gpu: &'a Gpu,
+    format: TextureFormat,
+    pending: u64,
+}
+
+impl Writer<'_> {
+    fn write(
+        &mut self,
+        texture: &Texture,
+        [x, y, z]: [u32; 3],
+        [width, height]: [u32; 2],
+        texels: &[[f32; 4]],
+        range: &Range,
+    ) -> Result<()> {
+        let shares = || texels.iter().flat_map(|t| range.share(*t));
+        let bytes: Vec<u8> = match self.format {
+            TextureFormat::Rgba32Float => bytemuck::cast_slice(texels).to_vec(),
+            TextureFormat::Rgba16Unorm => shares().flat_map(|v| ((v * 65535.0).round() as u16).to_ne_bytes()).collect(),
+            _ => shares().map(|v| (v * 255.0).round() as u8).collect(),
+        };
+        let gpu = self.gpu;
+        gpu.uploaded.fetch_add(bytes.len() as u64, Relaxed);
+        gpu.queue.write_texture(
+            wgpu::TexelCopyTextureInfo { origin: wgpu::Origin3d { x, y, z }, ..texture.raw.as_image_copy() },
+            &bytes,
+            wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(width * self.format.block_copy_size(None).unwrap_or(16)),
+                rows_per_image: Some(height),
+            },
+            wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        );
+        self.pending += bytes.len() as u64;
+        if self.pending >= AT_ONCE {
+            self.pending = 0;
+            gpu.queue.submit([]);
+            gpu.wait()?;
+        }
+        Ok(())
+    }
+}
+
+/// Where the planes of a cylinder are: as tiles of one layer, or of several where one would be too large.
+struct Tiles {
+    /// Width and height of one, in texels.
+    tile: [u32; 2],
+    count: u32,
+    across: u32,
+    down: u32,
+    packed: bool,
+}
+
+impl Tiles {
+    fn new(gpu: &Gpu, planes: &Cylindrical, packed: bool) -> Self {
+        Self::within(gpu.device.limits().max_texture_dimension_2d, planes.size, planes.planes, packed)
+    }
+
+    fn within(most: u32, size: u32, planes: u32, packed: bool) -> Self {
+        let (width, count) = if packed { (size + GAP, planes / 4 * 3 + 1) } else { (size, planes) };
+        let across = (f64::from(count).sqrt().ceil() as u32).min(most / width).max(1);
+        let down = count.div_ceil(across).min(most / size).max(1);
+        Tiles { tile: [width, size], count, across, down, packed }
+    }
+
+    /// Width and height of a layer, and how many there are.
+    fn size(&self) -> [u32; 3] {
+        let [w, h] = self.tile;
+        [w * self.across, h * self.down, self.count.div_ceil(self.across * self.down)]
+    }
+
+    fn parameters(&self) -> [f32; 4] {
+        let [w, h, _] = self.size().map(|n| n as f32);
+        [self.across as f32, (self.across * self.down) as f32, 1.0 / w, 1.0 / h]
+    }
+
+    /// The place of a tile, and its layer.
+    fn corner(&self, tile: u32) -> [u32; 3] {
+        let within = tile % (self.across * self.down);
+        let [w, h] = self.tile;
+        [within % self.across * w, within / self.across * h, tile / (self.across * self.down)]
+    }
+
+    /// What a tile holds: a plane; or, of those that are triangles, two.
+    fn texels<'a>(&self, planes: &'a Cylindrical, tile: u32) -> std::borrow::Cow<'a, [[f32; 4]]> {
+        let n = planes.size as usize;
+        let plane = |k: u32| &planes.texels[k as usize * n * n..][..n * n];
+        if !self.packed {
+            return plane(tile).into();
+        }
+        // S_f = t + s of the first quarter ends at 1, t − s of the last at 0. What is between the last of these planes and the next
+        // needs more of it.
+        let whole = tile >= planes.planes / 4;
+        let second = if tile == 0 || whole { tile } else { planes.planes - tile };
+        let (first, second) = (plane(tile), plane(second));
+        let texel = |(j, c): (usize, usize)| {
+            if whole || c <= n - j {
+                first[j * n + c.min(n - 1)]
+            } else {
+                second[j * n + (n + GAP as usize - 1 - c).min(n - 1)]
+            }
+        };
+        (0..n).flat_map(|j| (0..n + GAP as usize).map(move |c| (j, c))).map(texel).collect::<Vec<_>>().into()
+    }
+}
+
+/// The texture format of a table.
+fn texel_format(gpu: &Gpu, texels: Texels) -> Result<TextureFormat> {
+    let (format, feature, what) = match texels {
+        Texels::Unorm8 => return Ok(TextureFormat::Rgba8Unorm),
+        Texels::Unorm16 => (TextureFormat::Rgba16Unorm, wgpu::Features::TEXTURE_FORMAT_16BIT_NORM, "16-bit textures"),
+        Texels::Float => {
+            (TextureFormat::Rgba32Float, wgpu::Features::FLOAT32_FILTERABLE, "filtered 32-bit float textures")
+        }
+    };
+    if gpu.device.features().contains(feature) {
+        return Ok(format);
+    }
+    Err(Error::Device(format!("{} has no {what}; use other texels for the table", gpu.adapter.name)))
+}
+
+#[cfg(test)]
+mod tests;

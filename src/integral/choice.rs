@@ -1,0 +1,232 @@
+//! Which form of the ray-segment integral draws.
+
+use super::table::Kind;
+use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
+
+/// A form of the ray-segment integral and, for tables, what differs between the published ones. The default is exact.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
+pub struct Choice {
+    /// The form.
+    pub form: Form,
+    /// What a volume holds, and for which lengths.
+    pub lengths: Kind,
+    /// Texels: values in front, values behind, and lengths of a volume or planes of a cylinder; those of polynomials are their
+    /// degree's. Values in front and behind are as many but for volumes. Without: [`Choice::size`].
+    pub table: Option<[u32; 3]>,
+    /// Of polynomials, from 1 to 8: Guthe et al. (2002) have 1, 2 and 4.
+    pub degree: u32,
+    /// How polynomials' opacity depends on the length.
+    pub alpha: Alpha,
+    /// How a cylinder's planes are stored and read.
+    pub planes: Planes,
+    /// Which of a cylinder's planes serve a fragment is known from its cell: true in parallel views, where it is always done,
+    /// and an approximation in others. For interpolated fragments of the projection engine.
+    pub per_cell: bool,
+    /// What a table's texels are.
+    pub texels: Texels,
+}
+
+impl Default for Choice {
+    fn default() -> Self {
+        Choice {
+            form: Form::default(),
+            lengths: Kind::default(),
+            table: None,
+            degree: 2,
+            alpha: Alpha::default(),
+            planes: Planes::default(),
+            per_cell: false,
+            texels: Texels::default(),
+        }
+    }
+}
+
+/// A form of the ray-segment integral.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Form {
+    /// The exact integral, or a table where functions have so many knots that a look-up is faster: [`Choice::resolved`].
+    Auto,
+    /// The exact integral.
+    #[default]
+    Exact,
+    /// A table of three parameters: [`super::table::Table`].
+    Volume,
+    /// Tables of two parameters, and a polynomial of the third: [`super::table::Polynomial`].
+    Polynomial,
+    /// A table of three parameters that projected cells need a plane of: [`super::table::Cylindrical`].
+    Cylindrical,
+}
+
+impl Form {
+    /// All, by the names that they have in scenes.
+    pub const ALL: [(&'static str, Form); 5] = [
+        ("auto", Form::Auto),
+        ("exact", Form::Exact),
+        ("volume", Form::Volume),
+        ("polynomial", Form::Polynomial),
+        ("cylindrical", Form::Cylindrical),
+    ];
+
+    /// The name that it has in scenes.
+    pub fn name(self) -> &'static str {
+        Form::ALL.into_iter().find(|f| f.1 == self).map_or("", |f| f.0)
+    }
+}
+
+/// How polynomials' opacity depends on the length.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Alpha {
+    /// As it does: α = 1 − e^{−l ρ̂}.
+    #[default]
+    Exponential,
+    /// Linearly, up to what it is at the longest length: the baseline that Guthe et al. compare with.
+    Linear,
+}
+
+/// How a cylinder's planes are stored and read.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Planes {
+    /// The two nearest are interpolated.
+    #[default]
+    Two,
+    /// The nearest alone is read, as by graphics cards with one texture.
+    One,
+    /// As [`Planes::Two`], with the two triangles that steep planes are in one tile: a quarter less memory.
+    Packed,
+}
+
+/// What a table's texels are.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Texels {
+    /// 32-bit floats.
+    #[default]
+    Float,
+    /// 16 bits, of the range that there is.
+    Unorm16,
+    /// 8 bits, likewise.
+    Unorm8,
+}
+
+/// Knots that the mean cell spans, up to which [`Form::Auto`] is exact.
+pub const FEW_KNOTS: f64 = 8.0;
+
+/// Bytes of a table at most.
+const MOST_BYTES: u64 = 1 << 30;
+
+impl Choice {
+    /// This form with everything else as it is by default.
+    pub fn of(form: Form) -> Self {
+        Choice { form, ..Choice::default() }
+    }
+
+    /// [`Form::Auto`] decided; other forms stay. `knots` is the number of knots that the values in the mean cell span, of `all`
+    /// that the function has.
+    ///
+    /// The exact integral takes time that grows with the knots which a segment crosses, and a look-up does not: up to
+    /// [`FEW_KNOTS`] in the mean cell it is exact, beyond it is a table of polynomials, the smallest form for as many values. A
+    /// table needs about two texels for each knot, so that functions of more than 512 stay exact too.
+    pub fn resolved(self, knots: f64, all: usize) -> Self {
+        if self.form != Form::Auto {
+            return self;
+        }
+        let form = if knots > FEW_KNOTS && all <= 512 { Form::Polynomial } else { Form::Exact };
+        Choice { form, ..self }
+    }
+
+    /// Texels along each axis, for a function of so many knots; the last is that of lengths, coefficients or planes.
+    pub fn size(&self, knots: usize) -> [u32; 3] {
+        let values = |low: u32, high: u32| (2 * knots as u32).next_power_of_two().clamp(low, high);
+        match (self.form, self.table) {
+            (Form::Polynomial, Some([front, ..])) => [front, front, self.degree + 1],
+            (Form::Polynomial, None) => [values(512, 1024), values(512, 1024), self.degree + 1],
+            (_, Some(table)) => table,
+            (Form::Cylindrical, None) => [256; 3],
+            (_, None) if self.lengths == Kind::Uniform => [256, 256, 64],
+            (_, None) => [values(256, 512), values(256, 512), 16],
+        }
+    }
+
+    /// Bytes of a table of `size`, as 32-bit floats.
+    pub fn bytes(size: [u32; 3]) -> u64 {
+        size.iter().fold(16, |n: u64, &s| n.saturating_mul(u64::from(s)))
+    }
+
+    /// Whether there can be such a table.
+    ///
+    /// # Errors
+    /// [`Error::Render`], with what there can be.
+    pub fn check(&self, size: [u32; 3]) -> Result<()> {
+        let [front, back, depth] = size;
+        let wrong = match self.form {
+            Form::Auto | Form::Exact => return Ok(()),
+            Form::Volume if front < 2 || back < 2 || depth < 3 => {
+                Some("a table has at least 2, 2 and 3 texels along its axes".to_owned())
+            }
+            Form::Polynomial if front < 2 => Some("a table of polynomials has at least 2 x 2 texels".to_owned()),
+            Form::Polynomial if !(1..=8).contains(&self.degree) => {
+                Some(format!("polynomials have a degree from 1 to 8, and not {}", self.degree))
+            }
+            Form::Cylindrical if front != back || front < 2 || depth == 0 || !depth.is_multiple_of(4) => {
+                Some("a cylindrical table has as many texels for values in front as behind, at least 2, and a multiple of 4 planes".to_owned())
+            }
+            _ => None,
+        };
+        let bytes = Choice::bytes(size);
+        let wrong = wrong.or_else(|| {
+            (bytes > MOST_BYTES)
+                .then(|| format!("a table of {size:?} texels takes {bytes} bytes, and {MOST_BYTES} at most"))
+        });
+        wrong.map_or(Ok(()), |what| Err(Error::Render(format!("{what}; use another size, or the exact integral"))))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn auto_is_exact_while_knots_are_few() {
+        let form = |knots, all| Choice::of(Form::Auto).resolved(knots, all).form;
+        assert_eq!(form(0.3, 4), Form::Exact);
+        assert_eq!(form(FEW_KNOTS, 254), Form::Exact);
+        assert_eq!(form(FEW_KNOTS + 0.1, 254), Form::Polynomial);
+        // No table resolves so many.
+        assert_eq!(form(900.0, 5000), Form::Exact);
+        assert_eq!(Choice::of(Form::Volume).resolved(0.0, 1).form, Form::Volume);
+    }
+
+    #[test]
+    fn sizes_follow_the_function() {
+        assert_eq!(Choice::of(Form::Polynomial).size(10), [512, 512, 3]);
+        assert_eq!(Choice { degree: 4, ..Choice::of(Form::Polynomial) }.size(500), [1024, 1024, 5]);
+        assert_eq!(Choice::of(Form::Volume).size(200), [512, 512, 16]);
+        assert_eq!(Choice::of(Form::Cylindrical).size(3), [256; 3]);
+        let own = Choice { table: Some([8, 9, 10]), ..Choice::of(Form::Volume) };
+        assert_eq!(own.size(200), [8, 9, 10]);
+        for form in [Form::Volume, Form::Polynomial, Form::Cylindrical] {
+            let choice = Choice::of(form);
+            choice.check(choice.size(1_000_000)).unwrap();
+        }
+    }
+
+    #[test]
+    fn what_is_no_table_is_refused() {
+        let refused = |form, table, degree, part: &str| {
+            let choice = Choice { table: Some(table), degree, ..Choice::of(form) };
+            let message = choice.check(choice.size(4)).unwrap_err().to_string();
+            assert!(message.contains(part) && message.contains("exact"), "{message}");
+        };
+        refused(Form::Volume, [1, 2, 3], 2, "at least 2, 2 and 3");
+        refused(Form::Volume, [4096, 4096, 64], 2, "bytes");
+        refused(Form::Polynomial, [64, 64, 0], 9, "degree");
+        refused(Form::Polynomial, [1, 64, 0], 2, "2 x 2");
+        refused(Form::Cylindrical, [64, 64, 6], 2, "multiple of 4");
+        refused(Form::Cylindrical, [64, 32, 8], 2, "as many");
+    }
+}

@@ -1,0 +1,283 @@
+//! Tables as engines read them: in 32 bits, with texels rounded to what a device stores.
+
+use super::choice::{Alpha, Choice, Form, Planes, Texels};
+use super::table::{Cylindrical, Kind, Polynomial, Table, length};
+use super::{Exact, Light};
+use crate::error::{Error, Result};
+use crate::field;
+use crate::real::Real;
+
+/// A table of one of the forms.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Stored {
+    Volume(Table),
+    Polynomial(Polynomial),
+    Cylindrical(Cylindrical),
+}
+
+/// What texels between 0 and 1 stand for, channel by channel: so much, and so much more for each.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Range {
+    pub(crate) least: [f32; 4],
+    pub(crate) span: [f32; 4],
+}
+
+/// The integral of segments by a table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Lookup {
+    choice: Choice,
+    stored: Stored,
+    /// What texels stand for; for polynomials one for each power.
+    ranges: Vec<Range>,
+    direct: bool,
+    /// The reciprocal of the longest length, or for volumes of the thinnest slice but 0.
+    inverse: f32,
+}
+
+/// What is integrated, in whatever form: the exact integral is always there.
+#[derive(Debug, Clone, Copy)]
+pub struct Integral<'a> {
+    /// The exact integral.
+    pub exact: &'a Exact<f32>,
+    /// What takes its place where segments are integrated.
+    pub table: Option<&'a Lookup>,
+}
+
+impl Lookup {
+    /// Builds the table that `choice` says, for segments of up to `longest` normalised units, on the current rayon pool.
+    ///
+    /// # Errors
+    /// Those of [`Choice::check`]; [`Error::Render`] for fields of several components, of which tables have no room.
+    pub fn new(exact: &Exact<f64>, choice: &Choice, longest: f64) -> Result<Self> {
+        let size = choice.size(exact.opacity.len());
+        check(choice, size, exact.kind)?;
+        let [front, _, depth] = size;
+        let stored = match choice.form {
+            Form::Volume => Table::new(exact, choice.lengths, size, longest).map(Stored::Volume),
+            Form::Polynomial => Polynomial::new(exact, choice.degree, front, longest).map(Stored::Polynomial),
+            Form::Cylindrical => Cylindrical::new(exact, depth, front, longest).map(Stored::Cylindrical),
+            Form::Auto | Form::Exact => None,
+        };
+        let stored = stored.ok_or_else(|| Error::Render("the exact integral has no table".into()))?;
+        let unit = match &stored {
+            Stored::Volume(t) if t.kind != Kind::Uniform => length(t.kind, depth, longest, 1),
+            _ => longest,
+        };
+        let inverse = (1.0 / unit) as f32;
+        let mut table = Lookup { choice: *choice, ranges: vec![], stored, direct: exact.direct, inverse };
+        table.round();
+        Ok(table)
+    }
+
+    /// Rounds texels to what they are stored as.
+    fn round(&mut self) {
+        let levels = match self.choice.texels {
+            Texels::Float => 0.0,
+            Texels::Unorm16 => 65535.0,
+            Texels::Unorm8 => 255.0,
+        };
+        let parts: Vec<(Range, &mut [[f32; 4]])> = match &mut self.stored {
+            Stored::Volume(t) => vec![(from_zero(t.greatest()), &mut t.texels)],
+            Stored::Cylindrical(t) => {
+                let [r, g, b, _] = greatest(&t.texels);
+                let colour = r.max(g).max(b);
+                vec![(from_zero([colour, colour, colour, 1.0]), &mut t.texels)]
+            }
+            // Coefficients may be negative.
+            Stored::Polynomial(t) => t.texels.iter_mut().map(|t| (within(t), &mut t[..])).collect(),
+        };
+        for (range, texels) in parts {
+            if levels == 0.0 {
+                self.ranges.push(Range { least: [0.0; 4], span: [1.0; 4] });
+                continue;
+            }
+            for texel in texels {
+                *texel = range.value(range.share(*texel).map(|v| (v * levels).round() / levels));
+            }
+            self.ranges.push(range);
+        }
+    }
+
+    /// What was chosen.
+    pub fn choice(&self) -> &Choice {
+        &self.choice
+    }
+
+    pub(crate) fn stored(&self) -> &Stored {
+        &self.stored
+    }
+
+    pub(crate) fn ranges(&self) -> &[Range] {
+        &self.ranges
+    }
+
+    /// Texels along each axis.
+    pub fn size(&self) -> [u32; 3] {
+        match &self.stored {
+            Stored::Volume(t) => t.size,
+            Stored::Polynomial(t) => [t.size, t.size, t.degree + 1],
+            Stored::Cylindrical(t) => [t.size, t.size, t.planes],
+        }
+    }
+
+    /// The longest segment, in normalised units.
+    pub fn longest(&self) -> f64 {
+        match &self.stored {
+            Stored::Volume(t) => t.longest,
+            Stored::Polynomial(t) => t.longest,
+            Stored::Cylindrical(t) => t.longest,
+        }
+    }
+
+    /// Premultiplied colour and opacity of a segment, in normalised units: the twin of `tabulated` in `shaders/table.wgsl`.
+    pub fn look_up(&self, front: f32, back: f32, length: f32) -> [f32; 4] {
+        let (f, b) = (front * 0.5 + 0.5, back * 0.5 + 0.5);
+        match &self.stored {
+            Stored::Volume(t) => {
+                let [w, h, n] = t.size;
+                let steps = length * self.inverse;
+                let slices = match t.kind {
+                    Kind::Uniform => steps * (n - 1) as f32,
+                    _ => steps.max(1.0).log2() + steps.min(1.0),
+                };
+                let (slice, share) = between(slices / (n - 1) as f32, n);
+                let (i, j, area) = (between(f, w), between(b, h), w as usize * h as usize);
+                let near = bilinear(&t.texels[slice * area..], w, i, j);
+                let texel = mix(near, bilinear(&t.texels[(slice + 1) * area..], w, i, j), share);
+                if t.kind == Kind::LogNormalised { self.reconstructed(texel, length) } else { texel }
+            }
+            Stored::Polynomial(t) => {
+                let (i, j) = (between(f, t.size), between(b, t.size));
+                let x = (length * self.inverse).min(1.0);
+                let mut sum = [0.0; 4];
+                for texels in t.texels.iter().rev() {
+                    let c = bilinear(texels, t.size, i, j);
+                    sum = [sum[0] * x + c[0], sum[1] * x + c[1], sum[2] * x + c[2], c[3]];
+                }
+                self.reconstructed(sum, length)
+            }
+            Stored::Cylindrical(t) => {
+                let l = (length * self.inverse).min(1.0);
+                let (d, s) = (f - b, (f - b).abs().max(l));
+                if s <= 0.0 {
+                    return [0.0; 4];
+                }
+                let steep = 0.25 * l / s;
+                let a = if l > d.abs() {
+                    0.5 - 0.25 * d / s
+                } else if d >= 0.0 {
+                    steep
+                } else {
+                    1.0 - steep
+                };
+                let at = a * t.planes as f32;
+                let (i, j, area) = (between(s, t.size), between(b, t.size), (t.size * t.size) as usize);
+                let plane = |k: usize| bilinear(&t.texels[k % t.planes as usize * area..], t.size, i, j);
+                if self.choice.planes == Planes::One {
+                    return plane((at + 0.5) as usize);
+                }
+                let low = (at as usize).min(t.planes as usize - 1);
+                mix(plane(low), plane(low + 1), at - low as f32)
+            }
+        }
+    }
+
+    /// Colour and opacity of a segment, from its colour over what is seen of it and its mean extinction.
+    fn reconstructed(&self, [r, g, b, density]: [f32; 4], length: f32) -> [f32; 4] {
+        let alpha = match self.choice {
+            Choice { form: Form::Polynomial, alpha: Alpha::Linear, .. } => {
+                opacity_of_depth(density / self.inverse) * (length * self.inverse).min(1.0)
+            }
+            _ => opacity_of_depth(density * length),
+        };
+        let seen = if !self.direct {
+            alpha
+        } else if density * length > 1e-6 {
+            alpha / density
+        } else {
+            length
+        };
+        [r * seen, g * seen, b * seen, alpha]
+    }
+
+    /// Adds a segment of `length` to `light`. Values that are not finite make it invisible.
+    #[inline]
+    pub fn add(&self, front: f32, back: f32, length: f32, light: &mut Light<f32>) {
+        if front.is_finite() && back.is_finite() {
+            let [r, g, b, alpha] = self.look_up(front, back, length);
+            light.add([r, g, b], alpha);
+        }
+    }
+}
+
+/// Whether `choice` can be drawn with, of that size and for fields of this kind.
+///
+/// # Errors
+/// Those of [`Lookup::new`].
+pub fn check(choice: &Choice, size: [u32; 3], kind: field::Kind) -> Result<()> {
+    if kind != field::Kind::Scalar && choice.form != Form::Exact {
+        return Err(Error::Render("tables are for fields of one component; use the exact integral".into()));
+    }
+    choice.check(size)
+}
+
+impl Range {
+    /// A texel in units of this.
+    pub(crate) fn share(&self, texel: [f32; 4]) -> [f32; 4] {
+        std::array::from_fn(|k| ((texel[k] - self.least[k]) / self.span[k]).clamp(0.0, 1.0))
+    }
+
+    fn value(&self, share: [f32; 4]) -> [f32; 4] {
+        std::array::from_fn(|k| share[k] * self.span[k] + self.least[k])
+    }
+}
+
+fn from_zero(greatest: [f32; 4]) -> Range {
+    Range { least: [0.0; 4], span: greatest.map(|v| v.max(f32::MIN_POSITIVE)) }
+}
+
+fn greatest(texels: &[[f32; 4]]) -> [f32; 4] {
+    texels.iter().fold([f32::MIN_POSITIVE; 4], |m, t| std::array::from_fn(|k| m[k].max(t[k])))
+}
+
+/// The range of each channel.
+fn within(texels: &[[f32; 4]]) -> Range {
+    let first = texels.first().copied().unwrap_or_default();
+    let least = texels.iter().fold(first, |m, t| std::array::from_fn(|k| m[k].min(t[k])));
+    let most = texels.iter().fold(first, |m, t| std::array::from_fn(|k| m[k].max(t[k])));
+    Range { least, span: std::array::from_fn(|k| (most[k] - least[k]).max(f32::MIN_POSITIVE)) }
+}
+
+/// The first of the two texels of `n` that a place in [0, 1] is between, and the share of the second.
+#[inline(always)]
+fn between(x: f32, n: u32) -> (usize, f32) {
+    let at = x.clamp(0.0, 1.0) * (n - 1) as f32;
+    let low = (at as u32).min(n - 2);
+    (low as usize, at - low as f32)
+}
+
+#[inline(always)]
+fn mix(a: [f32; 4], b: [f32; 4], share: f32) -> [f32; 4] {
+    std::array::from_fn(|k| a[k] + (b[k] - a[k]) * share)
+}
+
+#[inline(always)]
+fn bilinear(texels: &[[f32; 4]], width: u32, (i, u): (usize, f32), (j, v): (usize, f32)) -> [f32; 4] {
+    let row = |j: usize| {
+        let at = j * width as usize + i;
+        mix(texels[at], texels[at + 1], u)
+    };
+    mix(row(j), row(j + 1), v)
+}
+
+/// 1 − e^{−depth}, accurate relative to itself.
+#[inline(always)]
+fn opacity_of_depth(d: f32) -> f32 {
+    if d < 0.25 {
+        return d * (1.0 - d / 2.0 * (1.0 - d / 3.0 * (1.0 - d / 4.0 * (1.0 - d / 5.0 * (1.0 - d / 6.0)))));
+    }
+    1.0 - Real::exp(-d)
+}
+
+#[cfg(test)]
+pub(crate) mod tests;

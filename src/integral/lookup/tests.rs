@@ -1,0 +1,154 @@
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use super::*;
+use crate::field::Normal;
+use crate::transfer::{Emission, TransferFunction};
+
+const UNIT: [Normal; 4] = [Normal { mid: 0.0, half: 1.0 }; 4];
+
+/// Ramps and a peak.
+pub(crate) fn exact(emission: Emission) -> Exact<f64> {
+    let color = vec![(-1.0, [1.0, 0.2, 0.0]), (0.3, [0.0, 0.5, 0.9]), (1.0, [0.4, 0.4, 0.4])];
+    let opacity = vec![(-1.0, 0.1), (0.0, 0.3), (0.2, 3.0), (0.4, 0.2), (1.0, 1.5)];
+    let transfer = TransferFunction::new(color, opacity, 1.0).unwrap().with_emission(emission).unwrap();
+    Exact::new(&transfer, field::Kind::Scalar, &UNIT, 1.0)
+}
+
+/// Every form and variant, small.
+pub(crate) fn choices() -> Vec<Choice> {
+    let mut all = vec![];
+    for lengths in [Kind::Uniform, Kind::Log, Kind::LogNormalised] {
+        all.push(Choice { lengths, table: Some([17, 9, 8]), ..Choice::of(Form::Volume) });
+    }
+    for degree in [1, 2, 4, 7] {
+        all.push(Choice { degree, table: Some([33, 33, 0]), ..Choice::of(Form::Polynomial) });
+    }
+    for planes in [Planes::Two, Planes::Packed, Planes::One] {
+        all.push(Choice { planes, table: Some([15, 15, 24]), ..Choice::of(Form::Cylindrical) });
+    }
+    all
+}
+
+/// Values in [−1, 1] and lengths up to 2: at the ends, equal, nearly equal, and anywhere.
+pub(crate) fn segments(n: usize) -> Vec<[f32; 3]> {
+    let mut seed = 7u64;
+    let mut unit = move || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 40) as f32 / (1u32 << 24) as f32
+    };
+    let mut all = vec![[0.0, 0.0, 0.0], [-1.0, 1.0, 2.0], [1.0, -1.0, 2.0], [1.0, 1.0, 0.0], [-1.0, -1.0, 2.0]];
+    for i in 0..n {
+        let (front, back, l) = (2.0 * unit() - 1.0, 2.0 * unit() - 1.0, 2.0 * unit());
+        all.push(match i % 4 {
+            0 => [front, front, l],
+            1 => [front, (front + 0.01 * back).clamp(-1.0, 1.0), l * 0.01],
+            2 => [front, back, l * l * l / 4.0],
+            _ => [front, back, l],
+        });
+    }
+    all
+}
+
+/// What f64 finds in the same table.
+pub(crate) fn judged(table: &Lookup, [front, back, l]: [f32; 3]) -> [f64; 4] {
+    let [front, back, l] = [front, back, l].map(f64::from);
+    match table.stored() {
+        Stored::Volume(t) => t.look_up(front, back, l),
+        Stored::Polynomial(t) => t.look_up(front, back, l),
+        Stored::Cylindrical(t) => t.look_up(front, back, l),
+    }
+}
+
+/// The greatest of the errors of `got` against f64's look-ups, over emission where that is direct and so has no bound.
+pub(crate) fn worst(table: &Lookup, segments: &[[f32; 3]], got: &[[f32; 4]]) -> f64 {
+    let errors = segments.iter().zip(got).map(|(s, got)| {
+        let want = judged(table, *s);
+        (0..4).map(|k| (f64::from(got[k]) - want[k]).abs()).fold(0.0, f64::max)
+    });
+    errors.fold(0.0, f64::max)
+}
+
+#[test]
+fn look_ups_are_those_of_f64() {
+    let segments = segments(20_000);
+    for emission in [Emission::Chromatic, Emission::Direct { scale: 0.7 }] {
+        for choice in choices() {
+            if choice.planes == Planes::One {
+                continue;
+            }
+            let table = Lookup::new(&exact(emission), &choice, 2.0).unwrap();
+            let got: Vec<_> = segments.iter().map(|&[f, b, l]| table.look_up(f, b, l)).collect();
+            let worst = worst(&table, &segments, &got);
+            assert!(worst < 4e-6, "{choice:?}, {emission:?}: {worst}");
+        }
+    }
+}
+
+#[test]
+fn one_plane_is_the_nearer_of_two() {
+    let exact = exact(Emission::Chromatic);
+    let of = |planes| {
+        let choice = Choice { planes, table: Some([15, 15, 24]), ..Choice::of(Form::Cylindrical) };
+        Lookup::new(&exact, &choice, 2.0).unwrap()
+    };
+    let (one, two) = (of(Planes::One), of(Planes::Two));
+    // On a plane both read the same: a = k / 24, at the border of the first part and in it.
+    for [front, back, l] in [[0.5, 0.0, 0.5], [0.5, 0.0, 1.0 / 6.0], [-0.5, 0.5, 2.0]] {
+        let [a, b] = [&one, &two].map(|t| t.look_up(front, back, l));
+        assert!((0..4).all(|k| (a[k] - b[k]).abs() < 1e-5), "{a:?}, {b:?}");
+    }
+    let between = |t: &Lookup| t.look_up(0.5, 0.0, 0.57);
+    assert!((between(&one)[3] - between(&two)[3]).abs() > 1e-5);
+}
+
+#[test]
+fn fewer_bits_round_texels() {
+    let exact = exact(Emission::Chromatic);
+    let segments = segments(2000);
+    for choice in choices() {
+        let error = |texels| {
+            let table = Lookup::new(&exact, &Choice { texels, ..choice }, 2.0).unwrap();
+            let fine = Lookup::new(&exact, &choice, 2.0).unwrap();
+            let got: Vec<_> = segments.iter().map(|&[f, b, l]| table.look_up(f, b, l)).collect();
+            let want: Vec<_> = segments.iter().map(|&[f, b, l]| fine.look_up(f, b, l)).collect();
+            let error = |(a, b): (&[f32; 4], &[f32; 4])| (0..4).map(|k| (a[k] - b[k]).abs()).fold(0.0, f32::max);
+            got.iter().zip(&want).map(error).fold(0.0, f32::max)
+        };
+        let [eight, sixteen] = [Texels::Unorm8, Texels::Unorm16].map(error);
+        assert!(eight > 20.0 * sixteen && sixteen > 0.0 && eight < 0.2, "{choice:?}: {eight}, {sixteen}");
+    }
+}
+
+#[test]
+fn linear_opacity_meets_the_exponential_at_the_ends() {
+    let exact = exact(Emission::Chromatic);
+    let of = |opacity| {
+        let choice = Choice { alpha: opacity, table: Some([33, 33, 0]), ..Choice::of(Form::Polynomial) };
+        Lookup::new(&exact, &choice, 2.0).unwrap()
+    };
+    let alpha = |opacity, l| of(opacity).look_up(0.3, 0.1, l)[3];
+    for l in [0.0, 2.0] {
+        assert!((alpha(Alpha::Linear, l) - alpha(Alpha::Exponential, l)).abs() < 1e-6, "{l}");
+    }
+    assert!(alpha(Alpha::Linear, 0.6) < 0.8 * alpha(Alpha::Exponential, 0.6));
+}
+
+#[test]
+fn limits_are_finite() {
+    let color = vec![(0.0, [1.0; 3])];
+    let opacity = vec![(-1.0, 0.0), (0.0, 0.0), (0.0, 1e20), (0.01, 1e20), (0.01, 0.0)];
+    let transfer = TransferFunction::new(color, opacity, 1.0).unwrap();
+    let exact = Exact::<f64>::new(&transfer, field::Kind::Scalar, &UNIT, 1.0);
+    for choice in choices() {
+        for texels in [Texels::Float, Texels::Unorm8] {
+            let table = Lookup::new(&exact, &Choice { texels, ..choice }, 2.0).unwrap();
+            for [f, b, l] in segments(500).into_iter().chain([[2.0, -2.0, 5.0], [0.005, 0.005, 1e-30]]) {
+                let c = table.look_up(f, b, l);
+                assert!(c.iter().all(|v| v.is_finite()) && c[3] >= 0.0 && c[3] <= 1.0, "{choice:?} {f} {b} {l}: {c:?}");
+            }
+        }
+    }
+    let pair = Exact::<f64>::new(&transfer, field::Kind::Pair, &UNIT, 1.0);
+    let refused = Lookup::new(&pair, &Choice::of(Form::Volume), 1.0).unwrap_err().to_string();
+    assert!(refused.contains("one component"), "{refused}");
+}

@@ -1,0 +1,131 @@
+//! Tables, built while frames are drawn.
+//!
+//! A frame that cannot wait is drawn with the exact integral until its table is there: it is never of another function than it
+//! should be.
+
+use crate::error::{Error, Result};
+use crate::geometry::{Geometry, Values};
+use crate::integral::{Choice, Exact, Lookup};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::time::Instant;
+
+/// Cells that are looked at, to tell how many knots the mean one spans.
+const SAMPLES: usize = 1 << 16;
+
+/// All that a table depends on.
+#[derive(Debug, PartialEq)]
+pub(super) struct Key {
+    pub(super) exact: Exact<f64>,
+    pub(super) choice: Choice,
+    pub(super) longest: f64,
+}
+
+/// A table, and the ms that building it took.
+#[derive(Debug, Clone)]
+pub(super) struct Built {
+    pub(super) table: Arc<Lookup>,
+    pub(super) ms: f64,
+}
+
+/// The table of the frames now, and the one that is being built.
+#[derive(Debug, Default)]
+pub(super) struct Tables {
+    ready: Option<(Arc<Key>, Built)>,
+    building: Option<(Arc<Key>, Receiver<Result<Built>>)>,
+    /// Not the renderer's: frames would wait behind the table's work.
+    pool: Option<rayon::ThreadPool>,
+}
+
+impl Key {
+    fn build(&self) -> Result<Built> {
+        let start = Instant::now();
+        let table = Lookup::new(&self.exact, &self.choice, self.longest)?;
+        Ok(Built { table: Arc::new(table), ms: start.elapsed().as_secs_f64() * 1e3 })
+    }
+}
+
+impl Tables {
+    /// The table of `key`; none if it is not there yet, and the caller does not `wait` for it. `own` is the pool of a caller
+    /// that waits.
+    ///
+    /// # Errors
+    /// Those of [`Lookup::new`], and [`Error::Render`] if no thread can be started.
+    pub(super) fn get(&mut self, key: &Arc<Key>, wait: bool, own: &rayon::ThreadPool) -> Result<Option<Built>> {
+        self.collect(key, wait)?;
+        if let Some((ready, built)) = &self.ready
+            && ready == key
+        {
+            return Ok(Some(built.clone()));
+        }
+        self.ready = None;
+        if wait {
+            let built = own.install(|| key.build())?;
+            self.ready = Some((Arc::clone(key), built.clone()));
+            return Ok(Some(built));
+        }
+        // One at a time: what was asked for last comes next.
+        if self.building.is_none() {
+            let (sender, receiver) = channel();
+            let own_key = Arc::clone(key);
+            self.pool(own)?.spawn(move || {
+                // A renderer that is gone wants no table.
+                let _ = sender.send(own_key.build());
+            });
+            self.building = Some((Arc::clone(key), receiver));
+        }
+        Ok(None)
+    }
+
+    /// Takes what has been built, waiting for it if it is `key`'s.
+    fn collect(&mut self, key: &Arc<Key>, wait: bool) -> Result<()> {
+        let Some((building, receiver)) = self.building.take() else { return Ok(()) };
+        let same = building == *key;
+        let got =
+            if wait && same { receiver.recv().map_err(|_| TryRecvError::Disconnected) } else { receiver.try_recv() };
+        match got {
+            Ok(built) if same => self.ready = Some((building, built?)),
+            // Of a function that is no more; or its builder is gone, and another is asked.
+            Ok(_) | Err(TryRecvError::Disconnected) => {}
+            Err(TryRecvError::Empty) => self.building = Some((building, receiver)),
+        }
+        Ok(())
+    }
+
+    fn pool(&mut self, own: &rayon::ThreadPool) -> Result<&rayon::ThreadPool> {
+        let pool = match self.pool.take() {
+            Some(pool) => pool,
+            // Half of the threads, so that frames have the others.
+            None => rayon::ThreadPoolBuilder::new()
+                .num_threads((own.current_num_threads() / 2).max(1))
+                .thread_name(|i| format!("halite-tables-{i}"))
+                .build()
+                .map_err(|e| Error::Render(format!("cannot start threads for tables: {e}")))?,
+        };
+        Ok(self.pool.insert(pool))
+    }
+}
+
+/// How many knots of the function the values of the mean cell have between them; of a sample, where there are many cells.
+pub(super) fn knots_in_cells(geometry: &Geometry, values: &Values<1>, exact: &Exact<f32>) -> f64 {
+    let knots = exact.opacity.places();
+    let step = geometry.cells.len().div_ceil(SAMPLES).max(1);
+    let (mut sum, mut count) = (0u64, 0u64);
+    for (i, cell) in geometry.cells.iter().enumerate().step_by(step) {
+        let corners = match values {
+            Values::Point(v) => cell.corners.map(|p| v[p as usize][0]),
+            Values::Corner(v) => v[i].map(|[s]| s),
+            Values::Cell(v) => [v[i][0]; 4],
+        };
+        let [low, high] = [corners.into_iter().fold(f32::MAX, f32::min), corners.into_iter().fold(f32::MIN, f32::max)];
+        if low <= high {
+            let between = knots.partition_point(|&s| s < high).saturating_sub(knots.partition_point(|&s| s <= low));
+            sum += between as u64;
+        }
+        count += 1;
+    }
+    sum as f64 / count.max(1) as f64
+}
+
+#[cfg(test)]
+mod tests;
