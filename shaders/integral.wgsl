@@ -37,13 +37,13 @@ var<private> work: u32;
 /// Light gathered from front to back: premultiplied colour, and how much of what lies behind comes through.
 var<private> light: vec4f;
 
-/// eˣ for x ≤ 0, as src/real.rs has it: the built-in function may be off by more.
+/// eˣ for x ≤ 0, as src/real.rs has it, but not below e^−87: the built-in function may be off by more.
 fn exponential(x: f32) -> f32 {
     let clamped = max(x, -87.0);
     let k = round(clamped * 1.442695);
     let r = fma(k, 2.1219444e-4, fma(k, -0.693359375, clamped));
     let p = 1.0 + r * (1.0 + r * (0.5 + r * (1.0 / 6.0 + r * (1.0 / 24.0 + r * (1.0 / 120.0 + r * (1.0 / 720.0))))));
-    return select(p * bitcast<f32>(u32(i32(k) + 127) << 23u), 0.0, x < -87.0);
+    return p * bitcast<f32>(u32(i32(k) + 127) << 23u);
 }
 
 /// 1 − e^{−depth}, accurate relative to itself.
@@ -54,53 +54,49 @@ fn opacity_of_depth(d: f32) -> f32 {
     return 1.0 - exponential(-d);
 }
 
-/// One node's share of ∫ u T′(u) e^{−T(u)} du (chromatic) or of ∫ (1, u) e^{−T(u)} du (direct).
-fn node(x: f32, y: f32, start: f32, width: f32, at: vec2f) -> vec2f {
+/// One node's share of ∫ T′(u) e^{−T(u)} du, ∫ u T′(u) e^{−T(u)} du, ∫ e^{−T(u)} du and ∫ u e^{−T(u)} du, as far as they are asked for.
+fn node(x: f32, y: f32, start: f32, width: f32, at: vec2f) -> vec3f {
     let u = start + width * at.x;
     let rise = (y - x) * u;
     let e = width * at.y * exponential(-(x + rise * 0.5) * u);
+    let absorbed = (x + rise) * e;
     if DIRECT {
-        return vec2f(e, u * e);
+        return vec3f(absorbed, e, u * e);
     }
-    return vec2f(u * (x + rise) * e, 0.0);
+    return vec3f(absorbed, u * absorbed, 0.0);
 }
 
-fn quadrature(x: f32, y: f32) -> vec2f {
-    var sum = vec2f();
-    if max(x, y) <= SHALLOW {
-        sum += node(x, y, 0.0, 1.0, GAUSS_3_0);
-        sum += node(x, y, 0.0, 1.0, GAUSS_3_1);
-        sum += node(x, y, 0.0, 1.0, GAUSS_3_2);
-        return sum;
-    }
+/// What a piece of optical depths `x` and `y` does: its opacity and the weights of the emission at its two ends.
+fn piece(x: f32, y: f32) -> vec3f {
     // Beyond T(u) = DEEP nothing is seen: x u + (y − x) u²/2 = DEEP.
     var end = 1.0;
     if x + y > 2.0 * DEEP {
         end = min(2.0 * DEEP / (x + sqrt(max(x * x + 2.0 * DEEP * (y - x), 0.0))), 1.0);
     }
-    let panels = u32(min(max(x, x + (y - x) * end) * end / PANEL, 64.0)) + 1u;
-    let width = end / f32(panels);
-    work += panels + 1u;
-    for (var p = 0u; p < panels; p++) {
-        let start = width * f32(p);
-        sum += node(x, y, start, width, GAUSS_6_0);
-        sum += node(x, y, start, width, GAUSS_6_1);
-        sum += node(x, y, start, width, GAUSS_6_2);
-        sum += node(x, y, start, width, GAUSS_6_3);
-        sum += node(x, y, start, width, GAUSS_6_4);
-        sum += node(x, y, start, width, GAUSS_6_5);
+    // Three nodes at a time: all of a shallow piece, or half a panel's. So drivers that take both ways of every decision
+    // compute no more than three for most pieces.
+    let is_shallow = max(x, y) <= SHALLOW;
+    let panels = f32(u32(min(max(x, x + (y - x) * end) * end / PANEL, 64.0))) + 1.0;
+    let width = end / panels;
+    var start = 0.0;
+    var second = false;
+    var sum = vec3f();
+    loop {
+        sum += node(x, y, start, width, select(select(GAUSS_6_0, GAUSS_6_3, second), GAUSS_3_0, is_shallow));
+        sum += node(x, y, start, width, select(select(GAUSS_6_1, GAUSS_6_4, second), GAUSS_3_1, is_shallow));
+        sum += node(x, y, start, width, select(select(GAUSS_6_2, GAUSS_6_5, second), GAUSS_3_2, is_shallow));
+        start = select(start, start + width, second);
+        second = !second;
+        work++;
+        if is_shallow || start > end - 0.5 * width {
+            break;
+        }
     }
-    return sum;
-}
-
-/// What a piece of optical depths `x` and `y` does: its opacity and the weights of the emission at its two ends.
-fn piece(x: f32, y: f32) -> vec3f {
-    let alpha = opacity_of_depth((x + y) * 0.5);
-    let sum = quadrature(x, y);
+    let alpha = select(sum.x, 1.0 - exponential(-(x + y) * 0.5), max(x, y) > PANEL);
     if DIRECT {
-        return vec3f(alpha, sum.x - sum.y, sum.y);
+        return vec3f(alpha, sum.y - sum.z, sum.z);
     }
-    let beta = min(sum.x, alpha);
+    let beta = min(sum.y, alpha);
     return vec3f(alpha, alpha - beta, beta);
 }
 

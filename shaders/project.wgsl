@@ -25,9 +25,9 @@ struct Frame {
     /// 1 in perspective views, 0 in parallel ones.
     perspective: u32,
     planes: u32,
-    unused_a: u32,
-    unused_b: u32,
-    unused_c: u32,
+    unused: u32,
+    /// From one pixel to the next, in units of x and y.
+    pixel: vec2f,
 }
 
 @group(0) @binding(3) var<uniform> frame: Frame;
@@ -46,7 +46,7 @@ fn seen(p: vec3f) -> vec3f {
 
 /// Where in the image, in [−1, 1] from its middle to its edges, the pixel with the centre `at` has its sample.
 fn sample_of(at: vec2f) -> vec2f {
-    return vec2f(2.0 * at.x - frame.size.x, frame.size.y - 2.0 * at.y) / frame.size + frame.offset;
+    return fma(at, frame.pixel, vec2f(-1.0, 1.0) + frame.offset);
 }
 
 fn direction_at(xy: vec2f) -> vec3f {

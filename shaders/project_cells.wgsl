@@ -18,13 +18,30 @@ struct Part {
 @group(2) @binding(3) var<storage, read> order: array<u32>;
 @group(2) @binding(4) var<storage, read_write> records: array<Record>;
 
-fn place(i: u32) -> vec3f {
-    let p = points(i);
+/// Relative to the frame's base.
+fn place(p: Point) -> vec3f {
     return (vec3f(p.x, p.y, p.z) - frame.base.xyz) + (vec3f(p.x_low, p.y_low, p.z_low) - frame.base_low.xyz);
 }
 
-fn places(cell: vec4u) -> array<vec3f, 4> {
-    return array<vec3f, 4>(place(cell.x), place(cell.y), place(cell.z), place(cell.w));
+/// From one point to another: as accurate as it is short.
+fn way(a: Point, b: Point) -> vec3f {
+    return (vec3f(b.x, b.y, b.z) - vec3f(a.x, a.y, a.z)) + (vec3f(b.x_low, b.y_low, b.z_low) - vec3f(a.x_low, a.y_low, a.z_low));
+}
+
+/// A tetrahedron: its corners, and the ways from the first to the others.
+struct Solid {
+    p: array<vec3f, 4>,
+    b: vec3f,
+    c: vec3f,
+    d: vec3f,
+}
+
+fn solid_of(cell: vec4u) -> Solid {
+    let a = points(cell.x);
+    let b = points(cell.y);
+    let c = points(cell.z);
+    let d = points(cell.w);
+    return Solid(array<vec3f, 4>(place(a), place(b), place(c), place(d)), way(a, b), way(a, c), way(a, d));
 }
 
 fn values_of(cell: u32, corners: vec4u) -> array<Value, 4> {
@@ -64,7 +81,7 @@ fn key_of(cell: u32) -> u32 {
     if !shows(min(min(s.x, s.y), min(s.z, s.w)), max(max(s.x, s.y), max(s.z, s.w))) {
         return HIDDEN;
     }
-    let p = places(corners);
+    let p = solid_of(corners).p;
     let a = seen(p[0]);
     let b = seen(p[1]);
     let c = seen(p[2]);
@@ -141,7 +158,7 @@ fn project_all(@builtin(global_invocation_id) id: vec3u) {
         }
     }
     let corners = cells(cell);
-    records[i] = record_of(places(corners), values_of(cell, corners), piece, part.rank + i);
+    records[i] = record_of(solid_of(corners), values_of(cell, corners), piece, part.rank + i);
 }
 
 /// How the four directions from the eye to the corners depend on each other: Σ a p = 0, the sum of a being six volumes. For a

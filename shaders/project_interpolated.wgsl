@@ -19,6 +19,9 @@ struct Record {
     difference: f32,
     /// Of the thickest point: how long the ray's way is.
     thickness: f32,
+    /// The interval of the function that the least value is in.
+    interval: u32,
+    unused: u32,
     /// Of the outline's corners, and of the front and the back of the thickest point.
     values: array<Value, 4>,
     front: Value,
@@ -39,8 +42,8 @@ fn reach_of(p: vec3f) -> f32 {
     return select(along, 1.0 / (along + frame.forward.w), frame.perspective == 1u);
 }
 
-/// A cell's corners and values; false if it is none.
-struct Solid {
+/// A piece of a cell, its corners and values; false if it is none.
+struct Piece {
     p: array<vec3f, 4>,
     v: array<Value, 4>,
     exists: bool,
@@ -49,12 +52,12 @@ struct Solid {
 /// A record of nothing.
 fn nothing(p: array<vec3f, 4>, v: array<Value, 4>, rank: u32) -> Record {
     let at = array<vec2f, 4>(vec2f(-9.0), vec2f(-9.0), vec2f(-9.0), vec2f(-9.0));
-    return Record(at, vec2f(-9.0), rank, 0.0, array<f32, 4>(1.0, 1.0, 1.0, 1.0), 1.0, 1.0, 0.0, 0.0, v, v[0], v[0], v[0], v[0]);
+    return Record(at, vec2f(-9.0), rank, 0.0, array<f32, 4>(1.0, 1.0, 1.0, 1.0), 1.0, 1.0, 0.0, 0.0, 0u, 0u, v, v[0], v[0], v[0], v[0]);
 }
 
 /// The piece of a cell that lies behind the plane at the depth `frame.nearest`. With one corner behind it, the first piece is all;
 /// with two or three, a wedge is left, which is three tetrahedra.
-fn cut(whole: array<vec3f, 4>, whole_values: array<Value, 4>, piece: u32) -> Solid {
+fn cut(whole: array<vec3f, 4>, whole_values: array<Value, 4>, piece: u32) -> Piece {
     // Corners behind the plane first.
     var behind = array<u32, 4>(0u, 1u, 2u, 3u);
     var depths = array<f32, 4>(0.0, 0.0, 0.0, 0.0);
@@ -73,7 +76,7 @@ fn cut(whole: array<vec3f, 4>, whole_values: array<Value, 4>, piece: u32) -> Sol
         }
     }
     if first == 4u || first == 0u {
-        return Solid(p, v, first == 4u && piece == 0u);
+        return Piece(p, v, first == 4u && piece == 0u);
     }
     // The six corners of what is left: those behind the plane, and where edges cross it.
     var corners: array<vec3f, 6>;
@@ -92,7 +95,7 @@ fn cut(whole: array<vec3f, 4>, whole_values: array<Value, 4>, piece: u32) -> Sol
     var at = vec4u(0u, 1u, 2u, 3u);
     if first == 1u {
         if piece > 0u {
-            return Solid(p, v, false);
+            return Piece(p, v, false);
         }
         corners[3] = p[behind[0]];
         values[3] = v[behind[0]];
@@ -117,19 +120,20 @@ fn cut(whole: array<vec3f, 4>, whole_values: array<Value, 4>, piece: u32) -> Sol
         p[i] = corners[at[i]];
         v[i] = values[at[i]];
     }
-    return Solid(p, v, true);
+    return Piece(p, v, true);
 }
 
-fn record_of(corners: array<vec3f, 4>, values: array<Value, 4>, piece: u32, rank: u32) -> Record {
+fn record_of(whole: Solid, values: array<Value, 4>, piece: u32, rank: u32) -> Record {
+    let corners = whole.p;
     var p = corners;
     var v = values;
     if frame.perspective == 1u {
-        let solid = cut(p, v, piece);
-        if !solid.exists {
+        let left = cut(p, v, piece);
+        if !left.exists {
             return nothing(corners, values, rank);
         }
-        p = solid.p;
-        v = solid.v;
+        p = left.p;
+        v = left.v;
     }
     let a = dependency(p);
     let around = outline(a);
@@ -171,6 +175,8 @@ fn record_of(corners: array<vec3f, 4>, values: array<Value, 4>, piece: u32, rank
         back_depth,
         difference,
         length(apart),
+        interval_of(last_of(low)),
+        0u,
         array<Value, 4>(v[around.x], v[around.y], v[around.z], v[around.w]),
         v[0] * one.x + v[1] * one.y + v[2] * one.z + v[3] * one.w,
         v[0] * other.x + v[1] * other.y + v[2] * other.z + v[3] * other.w,

@@ -12,9 +12,13 @@ struct Drawn {
     @location(3) @interpolate(flat) least: Value,
     @location(4) @interpolate(flat) greatest: Value,
     @location(5) @interpolate(flat) longest: f32,
-    @location(6) @interpolate(flat) rank: u32,
+    /// The rank, and the interval of the function that the least value is in.
+    @location(6) @interpolate(flat) tags: vec2u,
+    @location(7) @interpolate(flat) line_value: vec4f,
+    @location(8) @interpolate(flat) line_slope: vec4f,
+    @location(9) @interpolate(flat) line_ends: vec2f,
     /// Around a table's diagonal: see `plane_of`.
-    @location(7) @interpolate(flat) plane: f32,
+    @location(10) @interpolate(flat) plane: f32,
 }
 
 @vertex
@@ -26,9 +30,6 @@ fn vertex(@builtin(vertex_index) index: u32) -> Drawn {
     drawn.depths = vec4f(drawn_records[i].front_depth, drawn_records[i].back_depth, drawn_records[i].difference, drawn_records[i].thickness);
     drawn.front = drawn_records[i].front;
     drawn.back = drawn_records[i].back;
-    if PLANE_PER_CELL {
-        drawn.plane = plane_of(last_of(drawn.front), last_of(drawn.back), drawn_records[i].thickness);
-    }
     if k < 4u {
         at = drawn_records[i].outline[k];
         let depth = drawn_records[i].depths[k];
@@ -41,10 +42,20 @@ fn vertex(@builtin(vertex_index) index: u32) -> Drawn {
         drawn.back *= drawn.depths.y;
     }
     drawn.at = vec4f(2.0 * at.x / frame.size.x - 1.0, 1.0 - 2.0 * at.y / frame.size.y, 0.5, 1.0);
-    drawn.least = drawn_records[i].least;
-    drawn.greatest = drawn_records[i].greatest;
-    drawn.longest = drawn_records[i].longest;
-    drawn.rank = drawn_records[i].rank;
+    // Of each triangle the first corner's are taken.
+    if k == 4u {
+        drawn.least = drawn_records[i].least;
+        drawn.greatest = drawn_records[i].greatest;
+        drawn.longest = drawn_records[i].longest;
+        drawn.tags = vec2u(drawn_records[i].rank, drawn_records[i].interval);
+        let line = line_of(drawn.tags.y);
+        drawn.line_value = line.value;
+        drawn.line_slope = line.slope;
+        drawn.line_ends = vec2f(line.low, line.high);
+        if PLANE_PER_CELL {
+            drawn.plane = plane_of(last_of(drawn_records[i].front), last_of(drawn_records[i].back), drawn_records[i].thickness);
+        }
+    }
     return drawn;
 }
 
@@ -76,6 +87,17 @@ fn fragment(drawn: Drawn) -> @location(0) vec4f {
     length = clamp(length, 0.0, drawn.longest);
     front = clamp(front, drawn.least, drawn.greatest);
     back = clamp(back, drawn.least, drawn.greatest);
+    // As far as it is within the limits.
+    let t = depth * stretch;
     let limits = limits_of(drawn.at.xy, origin_at(xy), direction / stretch, stretch);
-    return shaded(drawn.at.xy, drawn.rank, front, back, depth * stretch, length, limits);
+    let start = max(limits.x - t, 0.0);
+    let end = min(limits.y - t, length);
+    if !(start < end) {
+        discard;
+    }
+    let rise = back - front;
+    back = select(front + rise * (end / length), back, end == length);
+    front = select(front + rise * (start / length), front, start == 0.0);
+    let line = Line(drawn.line_value, drawn.line_slope, drawn.line_ends.x, drawn.line_ends.y);
+    return quantised(colored(front, back, end - start, drawn.tags.y, line), drawn.at.xy, drawn.tags.x);
 }

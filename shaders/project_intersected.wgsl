@@ -2,10 +2,16 @@
 
 /// What is drawn of a cell: a quadrilateral, and the cell as fragments need it.
 struct Record {
-    /// Places relative to the frame's base; w of the first: six volumes, of the second: the rank.
-    corners: array<vec4f, 4>,
     outline: array<vec2f, 4>,
-    values: array<Value, 4>,
+    facets: Facets,
+    /// The centre of the pixel from which facets and values count, and the limits of the rays.
+    middle: vec4f,
+    /// Depth and t there, the longest edge, and 6 volumes.
+    extent: vec4f,
+    /// The rank, which facets are entered, and the interval of the function that holds the least value.
+    tags: vec4u,
+    /// Value in the middle; how it rises from pixel to pixel to the right and down, and towards the eye; the range of the corners'.
+    values: array<Value, 6>,
 }
 
 /// To pixels from the upper left corner of the image.
@@ -92,20 +98,76 @@ fn grown(corners: array<vec2f, 4>) -> array<vec2f, 4> {
     return array<vec2f, 4>(q[0] + u * low.x + v * low.y, q[0] + u * high.x + v * low.y, q[0] + u * high.x + v * high.y, q[0] + u * low.x + v * high.y);
 }
 
-fn record_of(p: array<vec3f, 4>, v: array<Value, 4>, piece: u32, rank: u32) -> Record {
-    var shape: array<vec2f, 4>;
+/// Depths that are as good as none, and volumes and slopes that f32 may not divide by.
+const AT_EYE = 1e-6;
+const FLAT = 1e-30;
+
+fn record_of(solid: Solid, v: array<Value, 4>, piece: u32, rank: u32) -> Record {
+    var p = solid.p;
+    var record: Record;
     let w = vec4f(seen(p[0]).z, seen(p[1]).z, seen(p[2]).z, seen(p[3]).z);
+    let centroid = p[0] + (solid.b + solid.c + solid.d) * 0.25;
+    var centre: vec2f;
     if any(w < vec4f(frame.nearest)) {
-        shape = box_of(p);
+        record.outline = box_of(p);
+        centre = (record.outline[0] + record.outline[2]) * 0.5;
     } else {
         let around = outline(dependency(p));
-        var corners = p;
-        shape = grown(array<vec2f, 4>(pixel_of(seen(corners[around.x])), pixel_of(seen(corners[around.y])), pixel_of(seen(corners[around.z])), pixel_of(seen(corners[around.w]))));
+        record.outline = grown(array<vec2f, 4>(pixel_of(seen(p[around.x])), pixel_of(seen(p[around.y])), pixel_of(seen(p[around.z])), pixel_of(seen(p[around.w]))));
+        centre = pixel_of(seen(centroid));
     }
-    let volume = abs(dot(p[1] - p[0], cross(p[2] - p[0], p[3] - p[0])));
-    return Record(
-        array<vec4f, 4>(vec4f(p[0], volume), vec4f(p[1], bitcast<f32>(rank)), vec4f(p[2], 0.0), vec4f(p[3], 0.0)),
-        shape,
-        v,
+    centre = floor(clamp(centre, vec2f(0.0), frame.size - 1.0)) + 0.5;
+    let xy = sample_of(centre);
+    // Where the pixel's ray is as deep as the cell's middle, how far that is from one pixel to the next, and from the eye.
+    var t = dot(centroid, frame.forward.xyz);
+    var depth = 1.0;
+    if frame.perspective == 1u {
+        depth = max(t + frame.forward.w, frame.nearest);
+        t = depth - frame.forward.w;
+    }
+    let along = direction_at(xy);
+    let at = fma(along, vec3f(t), origin_at(xy));
+    let right = fma(frame.direction[1].xyz, vec3f(t), frame.origin[0].xyz) * frame.pixel.x;
+    let down = fma(frame.direction[2].xyz, vec3f(t), frame.origin[1].xyz) * frame.pixel.y;
+    let out = along * depth;
+    let away = at - p[0];
+    // Inward normals, but for the sign of the volume, of the faces opposite to each corner.
+    let n = array<vec3f, 4>(-cross(solid.c - solid.b, solid.d - solid.b), cross(solid.c, solid.d), cross(solid.d, solid.b), cross(solid.b, solid.c));
+    let volume = dot(solid.b, n[1]);
+    let heights = vec4f(dot(away - solid.b, n[0]), dot(away, n[1]), dot(away, n[2]), dot(away, n[3]));
+    var slopes = vec4f(dot(out, n[0]), dot(out, n[1]), dot(out, n[2]), dot(out, n[3]));
+    if frame.perspective == 1u {
+        slopes -= heights;
+    }
+    slopes = select(slopes, vec4f(FLAT), abs(slopes) < vec4f(FLAT));
+    record.facets = Facets(
+        heights / slopes,
+        vec4f(dot(right, n[0]), dot(right, n[1]), dot(right, n[2]), dot(right, n[3])) / slopes,
+        vec4f(dot(down, n[0]), dot(down, n[1]), dot(down, n[2]), dot(down, n[3])) / slopes,
     );
+    let entered = (slopes > vec4f(0.0)) == vec4<bool>(volume > 0.0);
+    let bits = select(vec4u(0u), vec4u(1u, 2u, 4u, 8u), entered);
+    if !(abs(volume) > FLAT) {
+        record.outline = array<vec2f, 4>(vec2f(-9.0), vec2f(-9.0), vec2f(-9.0), vec2f(-9.0));
+    }
+    var limits = vec2f(t - frame.near, t - frame.far);
+    if frame.perspective == 1u {
+        limits = depth / max(vec2f(frame.near, frame.far) + frame.forward.w, vec2f(AT_EYE)) - 1.0;
+    }
+    record.middle = vec4f(centre, limits);
+    let longest = max(max(max(length(solid.b), length(solid.c)), max(length(solid.d), distance(solid.b, solid.c))), max(distance(solid.b, solid.d), distance(solid.c, solid.d)));
+    record.extent = vec4f(depth, t, longest, abs(volume));
+    let rises = array<Value, 3>((v[1] - v[0]) / volume, (v[2] - v[0]) / volume, (v[3] - v[0]) / volume);
+    let low = min(min(v[0], v[1]), min(v[2], v[3]));
+    let high = max(max(v[0], v[1]), max(v[2], v[3]));
+    record.values = array<Value, 6>(
+        v[0] + (rises[0] * dot(away, n[1]) + rises[1] * dot(away, n[2]) + rises[2] * dot(away, n[3])),
+        rises[0] * dot(right, n[1]) + rises[1] * dot(right, n[2]) + rises[2] * dot(right, n[3]),
+        rises[0] * dot(down, n[1]) + rises[1] * dot(down, n[2]) + rises[2] * dot(down, n[3]),
+        -(rises[0] * dot(out, n[1]) + rises[1] * dot(out, n[2]) + rises[2] * dot(out, n[3])),
+        low,
+        high,
+    );
+    record.tags = vec4u(rank, bits.x | bits.y | bits.z | bits.w, interval_of(last_of(low)), 0u);
+    return record;
 }

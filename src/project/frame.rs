@@ -37,7 +37,8 @@ pub(super) struct Frame {
     nearest: f32,
     perspective: u32,
     planes: u32,
-    unused: [u32; 3],
+    unused: u32,
+    pixel: [f32; 2],
 }
 
 /// A view as the shaders see it.
@@ -95,7 +96,8 @@ impl Seen {
             nearest: (fan.near + fan.ahead).max(NEAREST) as f32,
             perspective: u32::from(perspective),
             planes: planes.len() as u32,
-            unused: [0; 3],
+            unused: 0,
+            pixel: [2.0 / view.size()[0] as f32, -2.0 / view.size()[1] as f32],
         };
         Seen { frame, planes, ends }
     }

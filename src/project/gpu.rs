@@ -56,9 +56,6 @@ const MOST_GROUPS: u32 = 65_535;
 /// How much an outline is grown, in pixels: rasterisers round corners to this.
 const GROWTH: f64 = 1.0 / 256.0;
 
-/// How well, in normalised units, places along a ray are known that come from corners in f32.
-const SHARP: f64 = 2e-6;
-
 /// Loop iterations of a fragment that llvmpipe surely makes: see `traverse::gpu`.
 const MOST_WORK: u32 = 8000;
 
@@ -736,11 +733,11 @@ fn indices(form: Fragments) -> (u32, &'static [u32]) {
 /// Bytes of a record: `Record` in the shaders.
 fn stride<const N: usize>(form: Fragments) -> u64 {
     let values = 4 * N as u64;
-    let bytes = match form {
-        Fragments::Intersected => 96 + 4 * values,
-        Fragments::Interpolated | Fragments::Linear => 80 + 8 * values,
-    };
     let align = if N == 4 || form == Fragments::Intersected { 16 } else { 8 };
+    let bytes = match form {
+        Fragments::Intersected => 128 + 6 * values,
+        Fragments::Interpolated | Fragments::Linear => 88u64.next_multiple_of(align) + 8 * values,
+    };
     bytes.next_multiple_of(align)
 }
 
@@ -779,7 +776,7 @@ fn program(
     arrays: &[Array],
 ) -> String {
     let mut text = shader::prelude(variant);
-    for (name, value) in [("FAR", f64::from(FAR)), ("SHARP", SHARP), ("GROWTH", GROWTH), ("BESIDE", 1e-6)] {
+    for (name, value) in [("FAR", f64::from(FAR)), ("GROWTH", GROWTH), ("BESIDE", 1e-6)] {
         text += &format!("const {name} = {value:?}f;\n");
     }
     let form = match switches.fragments {
