@@ -73,10 +73,10 @@ const WIDEST: u32 = 256;
 const MARGIN: usize = 6;
 const LINES: usize = 24;
 
-/// From the fewest enhancements to the most, then what else can be switched.
-fn variants() -> Vec<Variant> {
+/// From the fewest enhancements to the most, then what else can be switched; with tables of this size, if it was said.
+fn variants(table: Option<[u32; 3]>) -> Vec<Variant> {
     let best = Switches::default();
-    let volume = |lengths, texels| Choice { lengths, texels, table: Some([256, 256, 16]), ..Choice::of(Form::Volume) };
+    let volume = |lengths, texels| Choice { lengths, texels, table, ..Choice::of(Form::Volume) };
     let (uniform, log) = (volume(Kind::Uniform, Texels::Unorm16), volume(Kind::Log, Texels::Unorm16));
     let interpolated = Switches { fragments: Fragments::Interpolated, ..best };
     let linear = Switches { fragments: Fragments::Linear, ..best };
@@ -114,6 +114,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
         return forms::run(options, threads);
     }
     let given = options.request.scene()?;
+    let table = options.request.choice(given.as_ref())?.table.or(Some([256, 256, 16]));
     let device = options.request.device(given.as_ref());
     let mut judge = Renderer::with_device(threads, DeviceChoice::Cpu)?;
     let job = judge.install(|| render::prepare(&options.request, given))?;
@@ -124,7 +125,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
         judge.render(&view, p)
     })?;
     set(&mut renderer, &job)?;
-    let all = variants();
+    let all = variants(table);
     let (count, mut rows) = (all.len() as f64, Vec::new());
     progress::during("drawing", |p| {
         for (i, variant) in all.into_iter().enumerate() {

@@ -24,12 +24,17 @@ struct Line {
     row: Row,
 }
 
-/// All forms; the last are for interpolated fragments only.
-fn forms(interpolated: bool) -> Vec<(&'static str, Choice)> {
-    let volume = |lengths, slices| Choice { lengths, table: Some([256, 256, slices]), ..Choice::of(Form::Volume) };
-    let polynomial = |degree| Choice { degree, ..Choice::of(Form::Polynomial) };
-    let cylindrical =
-        |planes, per_cell| Choice { planes, per_cell, table: Some([PLANES; 3]), ..Choice::of(Form::Cylindrical) };
+/// All forms, of tables of this size if it was said; or those that are of interest where fragments are interpolated.
+fn forms(interpolated: bool, table: Option<[u32; 3]>) -> Vec<(&'static str, Choice)> {
+    let volume =
+        |lengths, slices| Choice { lengths, table: table.or(Some([256, 256, slices])), ..Choice::of(Form::Volume) };
+    let polynomial = |degree| Choice { degree, table, ..Choice::of(Form::Polynomial) };
+    let cylindrical = |planes, per_cell| Choice {
+        planes,
+        per_cell,
+        table: table.or(Some([PLANES; 3])),
+        ..Choice::of(Form::Cylindrical)
+    };
     let two = |per_cell| cylindrical(Planes::Two, per_cell);
     if interpolated {
         return vec![
@@ -55,6 +60,7 @@ fn forms(interpolated: bool) -> Vec<(&'static str, Choice)> {
 
 pub(super) fn run(options: &Options, threads: usize) -> Result<()> {
     let given = options.request.scene()?;
+    let size = options.request.choice(given.as_ref())?.table;
     let device = options.request.device(given.as_ref());
     let mut judge = Renderer::with_device(threads, DeviceChoice::Cpu)?;
     let job = judge.install(|| render::prepare(&options.request, given))?;
@@ -74,9 +80,9 @@ pub(super) fn run(options: &Options, threads: usize) -> Result<()> {
         let name = format!("{engine} on {adapter}");
         let best = Switches::default();
         let interpolated = Switches { fragments: Fragments::Interpolated, ..best };
-        let mut all: Vec<_> = forms(false).into_iter().map(|f| (f, best)).collect();
+        let mut all: Vec<_> = forms(false, size).into_iter().map(|f| (f, best)).collect();
         if engine == "project" {
-            all.extend(forms(true).into_iter().map(|f| (f, interpolated)));
+            all.extend(forms(true, size).into_iter().map(|f| (f, interpolated)));
         }
         let count = all.len() as f64;
         progress::during("drawing", |p| {
