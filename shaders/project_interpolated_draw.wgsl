@@ -17,6 +17,8 @@ struct Drawn {
     @location(7) @interpolate(flat) line_value: vec4f,
     @location(8) @interpolate(flat) line_slope: vec4f,
     @location(9) @interpolate(flat) line_ends: vec2f,
+    /// Around a table's diagonal: see `plane_of`.
+    @location(10) @interpolate(flat) plane: f32,
 }
 
 @vertex
@@ -50,12 +52,16 @@ fn vertex(@builtin(vertex_index) index: u32) -> Drawn {
         drawn.line_value = line.value;
         drawn.line_slope = line.slope;
         drawn.line_ends = vec2f(line.low, line.high);
+        if PLANE_PER_CELL {
+            drawn.plane = plane_of(last_of(drawn_records[i].front), last_of(drawn_records[i].back), drawn_records[i].thickness);
+        }
     }
     return drawn;
 }
 
 @fragment
 fn fragment(drawn: Drawn) -> @location(0) vec4f {
+    cell_plane = drawn.plane;
     let xy = sample_of(drawn.at.xy);
     let direction = direction_at(xy);
     let stretch = length(direction);

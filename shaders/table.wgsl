@@ -13,6 +13,9 @@ struct Table {
     least: array<vec4f, 9>,
 }
 
+/// The plane around the diagonal that all segments of a cell are taken to lie on, where PLANE_PER_CELL.
+var<private> cell_plane: f32;
+
 /// Premultiplied colour and opacity of a segment, from its colour over what is seen of it and its mean extinction.
 fn reconstructed(texel: vec4f, length: f32) -> vec4f {
     let depth = length * texel.w;
@@ -102,25 +105,19 @@ fn around_diagonal(ends: vec2f, length: f32, a: f32) -> vec4f {
     return select(vec4f(), texel * table.span[0] + table.least[0], s > 0.0);
 }
 
-/// Premultiplied colour and opacity of a segment, whose plane around the diagonal is known.
-fn tabulated_on(front: f32, back: f32, length: f32, a: f32) -> vec4f {
+/// Premultiplied colour and opacity of a segment.
+fn tabulated(front: f32, back: f32, length: f32) -> vec4f {
     let ends = clamp(vec2f(front, back) * 0.5 + 0.5, vec2f(0.0), vec2f(1.0));
     if COLORING == POLYNOMIAL {
         return by_polynomials(ends, length);
     }
     if COLORING == CYLINDRICAL {
-        return around_diagonal(ends, length, a);
+        if PLANE_PER_CELL {
+            return around_diagonal(ends, length, cell_plane);
+        }
+        return around_diagonal(ends, length, plane_of(front, back, length));
     }
     return in_volume(ends, length);
-}
-
-/// Premultiplied colour and opacity of a segment.
-fn tabulated(front: f32, back: f32, length: f32) -> vec4f {
-    var a = 0.0;
-    if COLORING == CYLINDRICAL {
-        a = plane_of(front, back, length);
-    }
-    return tabulated_on(front, back, length, a);
 }
 
 /// Adds a segment to the light, as `add_segment` does.

@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use crate::field::Field;
 use crate::gpu::DeviceChoice;
 use crate::image::Image;
+use crate::integral::{Choice, Form};
 use crate::mesh::Mesh;
 use crate::mesh::cells::{self, Tetrahedra};
 use crate::render::{Engine, Renderer, Stats};
@@ -26,8 +27,8 @@ const TELL: Duration = Duration::from_millis(20);
 /// Names of the engines that a session may be asked for; the first two are the same.
 pub const ENGINES: [&str; 3] = ["auto", "traverse", "project"];
 
-/// Names of the forms of the ray integral that a session may be asked for.
-pub const INTEGRALS: [&str; 2] = ["auto", "exact"];
+/// Names of the forms of the ray integral that a session may be asked for; none is the second.
+pub const INTEGRALS: [&str; 5] = ["auto", "exact", "volume", "polynomial", "cylindrical"];
 
 /// Runs `work`; a panic in it is an error.
 ///
@@ -74,7 +75,9 @@ impl Session {
             }
         }
         let engine = if engine.eq_ignore_ascii_case("project") { Engine::Project } else { Engine::Auto };
-        let renderer = Renderer::with_engine(threads, DeviceChoice::parse(device), engine)?;
+        let mut renderer = Renderer::with_engine(threads, DeviceChoice::parse(device), engine)?;
+        let form = Form::ALL.into_iter().find(|f| f.0.eq_ignore_ascii_case(integral));
+        renderer.set_integral(Choice::of(form.map_or(Form::Exact, |f| f.1)));
         Ok(Session { renderer, state: State::NoMesh, mirrored: false, failed: false })
     }
 

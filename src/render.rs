@@ -258,11 +258,12 @@ impl Renderer {
         self.switches = switches;
     }
 
-    /// Integrates segments in another form from now on; the next frame waits for its table, if it is one.
+    /// Integrates segments in another form from now on. The next frame waits for its table, if one was named; with [`Form::Auto`]
+    /// frames are exact until there is a table.
     pub fn set_integral(&mut self, integral: Choice) {
         if self.integral != integral {
             self.integral = integral;
-            (self.key, self.waits) = (None, true);
+            (self.key, self.waits) = (None, integral.form != Form::Auto);
         }
     }
 
@@ -302,7 +303,7 @@ impl Renderer {
         self.field = None;
         self.forget(Part::Mesh);
         self.mesh = Some(Loaded { tetrahedra, geometry, points: points.len(), cells, longest: None });
-        self.waits = true;
+        self.waits = self.integral.form != Form::Auto;
     }
 
     /// Moves the points of the mesh; cells, fields and values stay. Cells keep their neighbours, so none may turn inside out,
@@ -352,7 +353,7 @@ impl Renderer {
             };
         self.field = Some(Prepared { normal: [0, 1, 2, 3].map(|k| field.normal(k)), values });
         self.forget(Part::Field);
-        self.waits = true;
+        self.waits = self.integral.form != Form::Auto;
         self.stats.upload_ms = ms(start);
         Ok(())
     }
@@ -456,6 +457,7 @@ impl Renderer {
             Some(key) => self.tables.get(key, self.waits, &self.pool)?,
             None => None,
         };
+        let late = key.as_ref().filter(|_| view.blend() == Blend::Composite && built.is_none()).cloned();
         let (mesh, table) = (&*mesh, built.as_ref().map(|b| &b.table));
         self.waits = false;
         self.stats.integral = table.map_or(Form::Exact, |t| t.choice().form).name().into();
@@ -477,6 +479,9 @@ impl Renderer {
                 Some(ProjectionStats { drawn_cells: records, order_ms, project_ms, draw_ms, fragments });
             self.stats.device_ms = project_ms.zip(draw_ms).map(|(p, d)| p + d);
             self.stats.frame_ms = ms(start);
+            if let Some(key) = late {
+                self.tables.start(&key, &self.pool)?;
+            }
             return Ok(Image { size: view.size(), pixels });
         }
         let frame = Frame { mesh, field, transfer, exact, table, view, progress };
@@ -496,6 +501,9 @@ impl Renderer {
         self.stats.repaired_rays = counts.repaired;
         self.stats.cpu_rays = counts.unfinished;
         self.stats.frame_ms = ms(start);
+        if let Some(key) = late {
+            self.tables.start(&key, &self.pool)?;
+        }
         Ok(image)
     }
 

@@ -281,7 +281,7 @@ struct Statistics
   std::uint64_t steps = 0, repairedRays = 0, deviceBytes = 0, uploadedBytes = 0;
 };
 
-/// How a renderer works; fixed once it is made. Empty names mean "auto".
+/// How a renderer works; fixed once it is made. Empty names mean the first that is said here.
 struct Settings
 {
   /// 0: one for each core.
@@ -291,7 +291,9 @@ struct Settings
   /// "auto" or "traverse": rays walk from cell to cell. "project": cells are sorted by depth and blended; it needs a device for
   /// graphics (not "cpu"), refuses the maximum, and its order is right for some meshes only.
   std::string engine;
-  /// "auto" or "exact".
+  /// "exact"; "volume", "polynomial" or "cylindrical": a table, which is as large as it is by default, and built while frames
+  /// are drawn with the exact integral if the transfer function alone changed; or "auto": exact, or a table where functions have
+  /// so many knots that it is faster.
   std::string integral;
 };
 

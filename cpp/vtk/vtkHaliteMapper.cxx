@@ -306,7 +306,7 @@ vtkHaliteMapper::vtkHaliteMapper()
 {
   this->SetDevice("auto");
   this->SetEngine("auto");
-  this->SetIntegral("auto");
+  this->SetIntegral("exact");
 }
 
 vtkHaliteMapper::~vtkHaliteMapper()

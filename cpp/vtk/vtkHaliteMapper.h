@@ -68,7 +68,9 @@ public:
 
   ///@{
   /**
-   * The form of the ray integral: "auto" (the default) or "exact".
+   * The form of the ray integral: "exact" (the default); a pre-integrated table, "volume", "polynomial" or "cylindrical"; or
+   * "auto": exact, or a table where a function has so many points that it is faster. After an edit of the volume's property
+   * frames are exact until the table is built anew, which happens meanwhile.
    */
   vtkSetStringMacro(Integral);
   vtkGetStringMacro(Integral);

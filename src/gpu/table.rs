@@ -38,8 +38,8 @@ pub(crate) fn declarations(group: u32, first: u32) -> String {
     (first..).zip(names).map(|(binding, name)| format!("@group({group}) @binding({binding}) {name};\n")).collect()
 }
 
-/// The constants that a program with this table is compiled for.
-pub(crate) fn constants(table: Option<&Lookup>) -> String {
+/// The constants that a program with this table is compiled for; `per_cell` if a cylinder's planes are known from the cell.
+pub(crate) fn constants(table: Option<&Lookup>, per_cell: bool) -> String {
     let mut text = String::new();
     let forms = ["EXACT", "UNIFORM", "LOG", "LOG_NORMALISED", "POLYNOMIAL", "CYLINDRICAL"];
     for (i, form) in forms.iter().enumerate() {
@@ -57,11 +57,13 @@ pub(crate) fn constants(table: Option<&Lookup>) -> String {
     };
     let choice = table.map(|t| *t.choice()).unwrap_or_default();
     text += &format!(
-        "const COLORING = {form};\nconst DEGREE = {}u;\nconst LINEAR_OPACITY = {};\nconst ONE_PLANE = {};\nconst PACKED = {};\n",
+        "const COLORING = {form};\nconst DEGREE = {}u;\nconst LINEAR_OPACITY = {};\nconst ONE_PLANE = {};\nconst PACKED = {};\n\
+         const PLANE_PER_CELL = {};\n",
         choice.degree,
         choice.alpha == Alpha::Linear && form == "POLYNOMIAL",
         choice.planes == Planes::One,
         choice.planes == Planes::Packed,
+        per_cell && form == "CYLINDRICAL",
     );
     text
 }

@@ -49,16 +49,18 @@ pub(super) struct Seen {
     pub(super) ends: Vec<f32>,
 }
 
-/// What of the limits of rays there is: shaders are compiled without the others.
+/// What there is of the limits of rays, and of shortcuts: shaders are compiled without the others.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Limits {
     pub(super) ends: bool,
     pub(super) planes: bool,
+    /// One pair of a table's planes serves all fragments of a cell.
+    pub(super) plane_per_cell: bool,
 }
 
 impl Seen {
     pub(super) fn limits(&self) -> Limits {
-        Limits { ends: !self.ends.is_empty(), planes: !self.planes.is_empty() }
+        Limits { ends: !self.ends.is_empty(), planes: !self.planes.is_empty(), plane_per_cell: false }
     }
 
     pub(super) fn new(geometry: &Geometry, view: &View) -> Self {

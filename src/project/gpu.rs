@@ -246,7 +246,11 @@ impl Project {
         let arrays = self.arrays()?;
         let seen = Seen::new(geometry, view);
         let variant = Variant { kind: exact.kind, direct: exact.direct };
-        let source = program(&variant, association, switches, table.map(|t| &**t), seen.limits(), &arrays);
+        let mut limits = seen.limits();
+        // In parallel views all segments of a cell are on one plane.
+        let one_plane = table.is_some_and(|t| t.choice().per_cell) || view.eye().is_none();
+        limits.plane_per_cell = one_plane && switches.fragments != Fragments::Intersected;
+        let source = program(&variant, association, switches, table.map(|t| &**t), limits, &arrays);
         self.compile(&arrays, source, switches, format)?;
         self.prepare_canvas::<N>(switches.fragments, view.size(), format)?;
         let frame = Pass::new(self, &seen)?;
@@ -802,7 +806,7 @@ fn program(
     text += arrays::POINT;
     let [records, drawing] = if form == "INTERSECTED" { INTERSECTED } else { INTERPOLATED };
     text += &shader::accessors(arrays);
-    text += &table::constants(table);
+    text += &table::constants(table, limits.plane_per_cell);
     text += &table::declarations(0, 6);
     [&text, shader::CELL, shader::INTEGRAL, TABLE, SHARED, CELLS, records, SHADE, drawing].join("\n")
 }

@@ -50,7 +50,7 @@ impl Tables {
     /// that waits.
     ///
     /// # Errors
-    /// Those of [`Lookup::new`], and [`Error::Render`] if no thread can be started.
+    /// Those of [`Lookup::new`].
     pub(super) fn get(&mut self, key: &Arc<Key>, wait: bool, own: &rayon::ThreadPool) -> Result<Option<Built>> {
         self.collect(key, wait)?;
         if let Some((ready, built)) = &self.ready
@@ -64,17 +64,27 @@ impl Tables {
             self.ready = Some((Arc::clone(key), built.clone()));
             return Ok(Some(built));
         }
-        // One at a time: what was asked for last comes next.
-        if self.building.is_none() {
-            let (sender, receiver) = channel();
-            let own_key = Arc::clone(key);
-            self.pool(own)?.spawn(move || {
-                // A renderer that is gone wants no table.
-                let _ = sender.send(own_key.build());
-            });
-            self.building = Some((Arc::clone(key), receiver));
-        }
         Ok(None)
+    }
+
+    /// Begins to build the table of `key`, unless it is there; after the frame that it was too late for, so that it does not
+    /// take that frame's time. `own` is the caller's pool.
+    ///
+    /// # Errors
+    /// [`Error::Render`] if no thread can be started.
+    pub(super) fn start(&mut self, key: &Arc<Key>, own: &rayon::ThreadPool) -> Result<()> {
+        // One at a time: what is asked for last comes next.
+        if self.building.is_some() || self.ready.as_ref().is_some_and(|r| r.0 == *key) {
+            return Ok(());
+        }
+        let (sender, receiver) = channel();
+        let own_key = Arc::clone(key);
+        self.pool(own)?.spawn(move || {
+            // A renderer that is gone wants no table.
+            let _ = sender.send(own_key.build());
+        });
+        self.building = Some((Arc::clone(key), receiver));
+        Ok(())
     }
 
     /// Takes what has been built, waiting for it if it is `key`'s.

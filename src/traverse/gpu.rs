@@ -407,7 +407,7 @@ fn program(variant: &Variant, association: &str, blend: Blend, table: Option<&Lo
         return [&text, shader::CELL, shader::INTEGRAL, TRAVERSE].join("\n");
     }
     text += ADD_TABULATED;
-    text += &table::constants(table);
+    text += &table::constants(table, false);
     text += &table::declarations(2, 0);
     [&text, shader::CELL, shader::INTEGRAL, TABLE, TRAVERSE].join("\n")
 }

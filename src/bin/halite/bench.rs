@@ -4,6 +4,7 @@ use anyhow::{Context, Result};
 use clap::Args;
 use halite::gpu::{self, DeviceChoice};
 use halite::render::{Renderer, Stats};
+use halite::transfer::TransferFunction;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -111,16 +112,35 @@ fn measure(options: &Options, job: &Job, renderer: &mut Renderer) -> Result<Run>
             Ok(ms(start))
         };
         let first_frame = draw(renderer)?;
+        // One that is chosen by the knots is not there yet.
+        if renderer.stats().knots_per_cell > 0.0 {
+            renderer.wait_for_table();
+            draw(renderer)?;
+        }
+        let tabulated = renderer.stats().table_bytes > 0;
+        let old = &job.scene.transfer;
+        let unit = old.unit_distance() * (1.0 + 1e-6);
+        let edited = TransferFunction::new(old.color().to_vec(), old.opacity().to_vec(), unit)?
+            .with_convention(old.convention())
+            .with_clamp(old.clamp())
+            .with_emission(old.emission())?;
         let (mut frames, mut edits) = (Vec::new(), Vec::new());
         for i in 0..options.frames {
             frames.push(draw(renderer)?);
             share(2 * i + 2);
-            // The same function again: it has to be taken for a new one all the same.
-            renderer.set_transfer(&job.scene.transfer);
+            // To and fro, so that every edit is one.
+            renderer.set_transfer(if i % 2 == 0 { &edited } else { &job.scene.transfer });
             edits.push(draw(renderer)?);
+            if tabulated {
+                renderer.wait_for_table();
+                draw(renderer)?;
+            }
             share(2 * i + 3);
         }
         // What the device did for a still view, not for an edit.
+        renderer.set_transfer(&job.scene.transfer);
+        renderer.wait_for_table();
+        draw(renderer)?;
         draw(renderer)?;
         let times =
             Times { load: job.load_ms, split: job.split_ms, first_frame, transfer_edit: Some(median(&mut edits)) };

@@ -1,3 +1,5 @@
+mod forms;
+
 use crate::render::{self, Job, Request};
 use crate::{output, progress};
 use anyhow::{Context, Result};
@@ -33,6 +35,9 @@ pub(crate) struct Options {
     /// How much differences are magnified
     #[arg(long, value_name = "GAIN", default_value_t = 10.0)]
     gain: f32,
+    /// Compare the forms of the integral instead, in both engines: the exact one and all tables
+    #[arg(long)]
+    integrals: bool,
     /// Write errors and times as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -104,6 +109,9 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     output::check_picture(&options.out)?;
     if let Some(path) = &options.json {
         output::check(path)?;
+    }
+    if options.integrals {
+        return forms::run(options, threads);
     }
     let given = options.request.scene()?;
     let device = options.request.device(given.as_ref());

@@ -23,7 +23,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 
 fn source(table: &Lookup, direct: bool) -> String {
     let variant = Variant { kind: field::Kind::Scalar, direct };
-    let constants = constants(Some(table)) + &declarations(2, 0);
+    let constants = constants(Some(table), false) + &declarations(2, 0);
     [&shader::prelude(&variant), &constants, shader::INTEGRAL, TABLE, MAIN].join("\n")
 }
 

@@ -106,6 +106,8 @@ fn auto_counts_the_knots_of_cells() {
     let few = renderer.stats().knots_per_cell;
     assert!(few > 0.1 && few < FEW_KNOTS, "{few}");
     renderer.set_transfer(&function(200, 2.0));
+    // A table that nobody named is not waited for, unless somebody says so.
+    assert_eq!(draw(&mut renderer).1, "exact");
     renderer.wait_for_table();
     assert_eq!(draw(&mut renderer).1, "polynomial");
     let many = renderer.stats().knots_per_cell;

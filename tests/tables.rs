@@ -1,0 +1,245 @@
+//! Tables in both engines: pictures by each form against the exact ones, and against the oracle's where its scenes are there.
+
+#![allow(
+    clippy::expect_used,
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stderr,
+    reason = "a test fails by panicking, and tells what it measured"
+)]
+
+mod common;
+
+use common::Scene;
+use glam::{DVec3, dvec3};
+use halite::field::Association;
+use halite::gpu::DeviceChoice;
+use halite::image::Image;
+use halite::integral::choice::{Alpha, Choice, Form, Planes, Texels};
+use halite::integral::table::Kind;
+use halite::mesh::cells::Tetrahedra;
+use halite::mesh::generate;
+use halite::project::{Fragments, Switches};
+use halite::render::{Engine, Renderer};
+use halite::scene;
+use halite::transfer::{Emission, TransferFunction};
+use halite::view::{Blend, Camera, Projection, View};
+use std::path::Path;
+
+/// A renderer with each engine, on `HALITE_TEST_DEVICE` or the first device; without any, the CPU's alone, which is said.
+fn renderers() -> Vec<(&'static str, Renderer)> {
+    let name = std::env::var("HALITE_TEST_DEVICE").unwrap_or_else(|_| "0".into());
+    let choice = DeviceChoice::Named(name);
+    let mut all = vec![("cpu", Renderer::with_device(2, DeviceChoice::Cpu).unwrap())];
+    for (engine, name) in [(Engine::Traverse, "traverse"), (Engine::Project, "project")] {
+        match Renderer::with_engine(2, choice.clone(), engine) {
+            Ok(renderer) => all.push((name, renderer)),
+            Err(e) if std::env::var("HALITE_REQUIRE_GPU").is_ok_and(|v| v == "1") => panic!("{e}"),
+            Err(e) => eprintln!("SKIPPED, as there is no device to test: {e}"),
+        }
+    }
+    all
+}
+
+fn set(renderer: &mut Renderer, scene: &Scene) {
+    renderer.set_mesh(&scene.mesh, scene.tetrahedra.clone());
+    renderer.set_field(&scene.field).unwrap();
+    renderer.set_transfer(&scene.transfer);
+}
+
+fn image(renderer: &mut Renderer, choice: Choice, view: &View) -> Image {
+    renderer.set_integral(choice);
+    let image = renderer.render(view, &|_| ()).unwrap();
+    assert_eq!(renderer.stats().integral, choice.form.name());
+    image
+}
+
+fn view(projection: Projection) -> View {
+    let camera = Camera { position: dvec3(1.3, 2.1, 3.2), focal_point: DVec3::ZERO, view_up: DVec3::Y, projection };
+    View::new(camera, [48, 40]).unwrap()
+}
+
+const PERSPECTIVE: Projection = Projection::Perspective { view_angle: 40.0 };
+const PARALLEL: Projection = Projection::Parallel { parallel_scale: 1.2 };
+
+/// Of one colour, of which the order of cells changes nothing: that by depth is not right for all.
+fn waves(emission: Emission) -> Scene {
+    let mesh = generate::tetrahedra(5);
+    Scene::new(&mesh, mesh.point_arrays()[0].clone(), Association::Point, |field| {
+        let [lo, hi] = field.range(0);
+        let at = |x: f64| lo + (hi - lo) * x;
+        let opacity =
+            [0.1, 1.5, 0.3, 2.0, 0.0, 0.7].iter().enumerate().map(|(i, a)| (at(i as f64 / 5.0), *a)).collect();
+        TransferFunction::new(vec![(0.0, [0.9, 0.6, 0.3])], opacity, 0.5).unwrap().with_emission(emission).unwrap()
+    })
+}
+
+/// Eight bands of two colours, and much extinction in single cells: what differs between polynomials is seen.
+fn bands() -> Scene {
+    let mesh = generate::tetrahedra(2);
+    Scene::new(&mesh, mesh.point_arrays()[0].clone(), Association::Point, |field| {
+        let [lo, hi] = field.range(0);
+        let at = |x: f64| lo + (hi - lo) * x;
+        let colour = |k: usize| if k.is_multiple_of(2) { [1.0, 0.5, 0.1] } else { [0.1, 0.3, 1.0] };
+        let edge = |k: usize| [(at((k as f64 + 0.02) / 8.0), colour(k)), (at((k as f64 + 0.98) / 8.0), colour(k))];
+        TransferFunction::new((0..8).flat_map(edge).collect(), vec![(lo, 1.0), (hi, 1.0)], 0.2).unwrap()
+    })
+}
+
+fn volume(lengths: Kind, table: [u32; 3]) -> Choice {
+    Choice { lengths, table: Some(table), ..Choice::of(Form::Volume) }
+}
+
+fn polynomial(degree: u32) -> Choice {
+    Choice { degree, table: Some([128, 128, 0]), ..Choice::of(Form::Polynomial) }
+}
+
+fn cylindrical(planes: Planes) -> Choice {
+    Choice { planes, table: Some([64, 64, 64]), ..Choice::of(Form::Cylindrical) }
+}
+
+/// Every form, and how far from the exact picture it may be.
+fn forms() -> Vec<(Choice, f64)> {
+    vec![
+        (volume(Kind::Uniform, [128, 128, 32]), 5e-3),
+        (volume(Kind::Log, [128, 128, 12]), 6e-2),
+        (volume(Kind::LogNormalised, [128, 128, 12]), 2e-3),
+        (polynomial(1), 3e-3),
+        (polynomial(2), 2e-3),
+        (Choice { alpha: Alpha::Linear, ..polynomial(2) }, 0.6),
+        (cylindrical(Planes::Two), 2e-2),
+        (cylindrical(Planes::Packed), 2e-2),
+        (cylindrical(Planes::One), 3e-2),
+        (Choice { texels: Texels::Unorm8, ..volume(Kind::LogNormalised, [128, 128, 12]) }, 4e-2),
+    ]
+}
+
+#[test]
+fn both_engines_draw_with_each_form() {
+    let mut all = renderers();
+    for emission in [Emission::Chromatic, Emission::Direct { scale: 0.4 }] {
+        let scene = waves(emission);
+        let view = view(PERSPECTIVE);
+        all.iter_mut().for_each(|(_, r)| set(r, &scene));
+        let exact = image(&mut all[0].1, Choice::default(), &view);
+        assert!(exact.pixels.iter().any(|p| p[3] > 0.5));
+        for (choice, bound) in forms() {
+            let mut first: Option<Image> = None;
+            for (engine, renderer) in &mut all {
+                let got = image(renderer, choice, &view);
+                let error = got.compare(&exact).unwrap();
+                assert!(error.max < bound && error.max > 1e-6, "{engine}, {choice:?}, {emission:?}: {error:?}");
+                // The same table gives the same picture, but where a real device's filter has fewer bits.
+                let first = first.get_or_insert_with(|| got.clone());
+                let apart = got.compare(first).unwrap();
+                assert!(apart.rmse < 1e-3, "{engine}, {choice:?}, {emission:?}: {apart:?} from the CPU's");
+            }
+        }
+    }
+}
+
+#[test]
+fn each_degree_is_clearly_better_than_the_one_before() {
+    let scene = bands();
+    let view = view(PERSPECTIVE);
+    for (engine, renderer) in &mut renderers() {
+        set(renderer, &scene);
+        let exact = image(renderer, Choice::default(), &view);
+        let [linear, quadratic, quartic] =
+            [1, 2, 4].map(|degree| image(renderer, polynomial(degree), &view).compare(&exact).unwrap().rmse);
+        eprintln!("{engine}: degree 1 {linear:.1e}, 2 {quadratic:.1e}, 4 {quartic:.1e}");
+        assert!(linear > 1.5 * quadratic && quadratic > 1.5 * quartic, "{engine}: {linear} {quadratic} {quartic}");
+    }
+}
+
+/// In a parallel view all of a cell is on one plane; in a perspective one it is not.
+#[test]
+fn a_plane_serves_a_cell_in_parallel_views() {
+    let scene = waves(Emission::Chromatic);
+    let mut all = renderers();
+    let Some((_, renderer)) = all.iter_mut().find(|r| r.0 == "project") else { return };
+    set(renderer, &scene);
+    let per_cell = Choice { per_cell: true, ..cylindrical(Planes::Two) };
+    let mut errors = |projection| {
+        let view = view(projection);
+        renderer.set_switches(Switches::default());
+        let by_fragment = image(renderer, cylindrical(Planes::Two), &view);
+        renderer.set_switches(Switches { fragments: Fragments::Interpolated, ..Switches::default() });
+        image(renderer, per_cell, &view).compare(&by_fragment).unwrap().max
+    };
+    let (parallel, perspective) = (errors(PARALLEL), errors(PERSPECTIVE));
+    eprintln!("a plane for each cell: parallel {parallel:.1e}, perspective {perspective:.1e}");
+    assert!(parallel < 2e-4 && perspective > 2.0 * parallel && perspective < 5e-2);
+}
+
+#[test]
+fn what_tables_cannot_draw_is_said() {
+    let mesh = generate::tetrahedra(3);
+    let lot = &common::draw::FIELDS[2];
+    let scene = common::draw::scene(&mesh, lot, &common::draw::LOOKS[0], &mut common::draw::Random::of("pair"));
+    let view = view(PERSPECTIVE);
+    for (engine, renderer) in &mut renderers() {
+        set(renderer, &scene);
+        renderer.set_integral(polynomial(2));
+        let refused = renderer.render(&view, &|_| ()).unwrap_err().to_string();
+        assert!(refused.contains("one component"), "{engine}: {refused}");
+        // What is chosen for one, and may be exact, is.
+        renderer.set_integral(Choice::of(Form::Auto));
+        renderer.render(&view, &|_| ()).unwrap();
+        assert_eq!(renderer.stats().integral, "exact");
+    }
+    // The largest value along a ray needs no table, and has its own picture.
+    let (_, cpu) = &mut renderers()[0];
+    set(cpu, &waves(Emission::Chromatic));
+    let maximum = view.with_blend(Blend::Maximum);
+    let exact = image(cpu, Choice::default(), &maximum);
+    cpu.set_integral(polynomial(2));
+    assert!(cpu.render(&maximum, &|_| ()).unwrap() == exact);
+}
+
+/// A scene of the oracle's with its picture; none where that folder is not.
+fn reference(name: &str) -> Option<(Scene, View, Image)> {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/reference").join(name).with_extension("json");
+    if !file.exists() {
+        eprintln!("skipped: there is no {}", file.display());
+        return None;
+    }
+    let scene = scene::Scene::open(&file).unwrap();
+    let mesh = halite::io::open(&scene.mesh, &|_| ()).unwrap();
+    let (field, (view, _)) = (scene.scalars.field(&mesh).unwrap(), scene.view().unwrap());
+    let tetrahedra = Tetrahedra::new(&mesh).unwrap();
+    let truth = Image::open(&file.with_extension("npy")).unwrap();
+    Some((Scene { tetrahedra, mesh, field, transfer: scene.transfer }, view, truth))
+}
+
+#[test]
+fn reference_scenes_by_tables() {
+    // Devices in software take their time, and are near to the CPU in all that is drawn above.
+    let long = std::env::var("HALITE_LONG").is_ok_and(|v| v == "1");
+    let mut all = renderers();
+    all.truncate(if long { all.len() } else { 1 });
+    if !long {
+        eprintln!("on the CPU alone: HALITE_LONG=1 draws on all");
+    }
+    for name in ["wavelet_smooth", "wavelet_parallel", "wavelet_inside90"] {
+        let Some((scene, view, truth)) = reference(name) else { return };
+        for (engine, renderer) in &mut all {
+            set(renderer, &scene);
+            for form in [Form::Volume, Form::Polynomial] {
+                let error = image(renderer, Choice::of(form), &view).compare(&truth).unwrap();
+                eprintln!("{name}, {engine}, {form:?}: max {:.1e}, rmse {:.1e}", error.max, error.rmse);
+                assert!(error.max <= 2e-3 && error.rmse <= 2e-4, "{name}, {engine}, {form:?}: {error:?}");
+            }
+        }
+    }
+    let Some((scene, view, truth)) = reference("coarse_bands") else { return };
+    for (engine, renderer) in &mut all {
+        set(renderer, &scene);
+        let [linear, quadratic, quartic] = [1, 2, 4].map(|degree| {
+            let choice = Choice { degree, ..Choice::of(Form::Polynomial) };
+            image(renderer, choice, &view).compare(&truth).unwrap().rmse
+        });
+        eprintln!("coarse_bands, {engine}: degree 1 {linear:.1e}, 2 {quadratic:.1e}, 4 {quartic:.1e}");
+        assert!(linear > 3.0 * quadratic && quadratic > 3.0 * quartic);
+    }
+}
