@@ -110,6 +110,9 @@ fn usage() {
         place.misused(&format!("render cube.vtu --out x.png --size {size}"), "--size");
     }
     place.misused("render cube.vtu --out x.png --engine warp", "traverse");
+    place.misused("render cube.vtu --out x.png --integral guess", "polynomial");
+    place.misused("render cube.vtu --out x.png --lengths long", "log-normalised");
+    place.misused("render cube.vtu --out x.png --coloring log", "--coloring");
     place.misused("render cube.vtu --out x.png --range 1:0", "--range");
     place.misused("render cube.vtu --out x.png --background 1,2", "--background");
     place.misused("render cube.vtu --out x.png --clip 0,0,0,0,0,0", "normal");
@@ -147,6 +150,15 @@ fn failures_are_one_line() {
     place.fails("render cube.vtu --out x.png --scalars v --component 3", &["component 3"]);
     place.fails("render typo.json --out x.png", &["typo.json", "unit_distanse", "unit_distance"]);
     place.fails("render engine.json --out x.png", &["engine.json", "engine", "warp", "traverse"]);
+    for (name, integral, part) in [
+        ("name.json", "\"table\"", "polynomial"),
+        ("key.json", "{\"form\": \"volume\", \"size\": 3}", "size"),
+        ("form.json", "{\"form\": \"round\"}", "round"),
+    ] {
+        place.write(name, &SCENE.replace("\"size\"", &format!("\"integral\": {integral}, \"size\"")));
+        place.fails(&format!("render {name} --out x.png --device cpu"), &[name, "integral", part]);
+    }
+    place.fails("render cube.vtu --out x.png --device cpu --integral volume --table 1x1x1", &["at least 2", "exact"]);
     place.fails("render lost.json --out x.png", &["lost.vtu"]);
     place.fails("render scene.json --out x.gif", &["x.gif", ".png"]);
     place.fails("render scene.json --out no/x.png", &["no/x.png", "folder"]);
@@ -314,8 +326,39 @@ fn variants_of_the_projection_engine() {
     let variants = study["variants"].as_array().unwrap();
     let exact = variants.iter().find(|v| v["variant"] == "intersected, exact").unwrap();
     assert!(variants.len() > 12 && exact["rmse"].as_f64().unwrap() < 1e-2, "{study}");
+    let Ran(code, out, err) =
+        place.run("study cube.vtu --integrals --out forms.png --json forms.json --frames 1 --size 24x16");
+    assert_eq!((code, err.as_str()), (Some(0), ""));
+    assert!(out.contains("polynomial, degree 2") && out.contains("plane per cell"), "{out}");
+    let forms: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(place.path("forms.json")).unwrap()).unwrap();
+    let forms = forms["forms"].as_array().unwrap();
+    assert!(forms.len() > 30 && forms.iter().all(|f| f["rmse"].as_f64().unwrap() < 0.1), "{forms:?}");
     let sheet = std::fs::read(place.path("sheet.png")).unwrap();
     assert!(sheet.len() > 1000 && sheet.starts_with(b"\x89PNG"));
+}
+
+/// The options, a scene's object and its defaults say the same.
+#[test]
+fn integrals_are_chosen() {
+    let place = Place::new();
+    let form = |scene: &str, options: &str| {
+        place.write("scene.json", scene);
+        place.succeeds(&format!("render scene.json --out a.npy --device cpu --stats stats.json {options}"));
+        let stats = std::fs::read_to_string(place.path("stats.json")).unwrap();
+        let stats: serde_json::Value = serde_json::from_str(&stats).unwrap();
+        (stats["integral"].as_str().unwrap().to_owned(), stats["table_bytes"].as_u64().unwrap())
+    };
+    assert_eq!(form(SCENE, ""), ("exact".into(), 0));
+    assert_eq!(form(SCENE, "--integral volume --table 16x16x8"), ("volume".into(), 16 * 16 * 16 * 8));
+    assert_eq!(form(SCENE, "--integral polynomial --table 32x32 --degree 4"), ("polynomial".into(), 16 * 32 * 32 * 5));
+    let cylinder = ("cylindrical".to_owned(), 16 * 16 * 16 * 8);
+    assert_eq!(form(SCENE, "--integral cylindrical --table 16x16x8 --planes packed --texels unorm8"), cylinder);
+    let own = r#""integral": {"form": "cylindrical", "table": [16, 16, 8], "planes": "one"}, "size""#;
+    assert_eq!(form(&SCENE.replace("\"size\"", own), ""), cylinder);
+    let named = SCENE.replace("\"size\"", "\"integral\": \"auto\", \"size\"");
+    assert_eq!(form(&named, ""), ("exact".into(), 0));
+    assert_eq!(form(&named, "--integral exact"), ("exact".into(), 0));
 }
 
 #[test]

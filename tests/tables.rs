@@ -109,14 +109,14 @@ fn forms() -> Vec<(Choice, f64)> {
         (Choice { alpha: Alpha::Linear, ..polynomial(2) }, 0.6),
         (cylindrical(Planes::Two), 2e-2),
         (cylindrical(Planes::Packed), 2e-2),
-        (cylindrical(Planes::One), 3e-2),
-        (Choice { texels: Texels::Unorm8, ..volume(Kind::LogNormalised, [128, 128, 12]) }, 4e-2),
+        (cylindrical(Planes::One), 6e-2),
+        (Choice { texels: Texels::Unorm8, ..volume(Kind::LogNormalised, [128, 128, 12]) }, 8e-2),
     ]
 }
 
 #[test]
 fn both_engines_draw_with_each_form() {
-    let mut all = renderers();
+    let (mut all, mut wrong) = (renderers(), vec![]);
     for emission in [Emission::Chromatic, Emission::Direct { scale: 0.4 }] {
         let scene = waves(emission);
         let view = view(PERSPECTIVE);
@@ -128,14 +128,21 @@ fn both_engines_draw_with_each_form() {
             for (engine, renderer) in &mut all {
                 let got = image(renderer, choice, &view);
                 let error = got.compare(&exact).unwrap();
-                assert!(error.max < bound && error.max > 1e-6, "{engine}, {choice:?}, {emission:?}: {error:?}");
+                // Direct emission knows no 1.
+                let bound = if emission == Emission::Chromatic { bound } else { 2.0 * bound };
+                if !(error.max < bound && error.max > 1e-6) {
+                    wrong.push(format!("{engine}, {choice:?}, {emission:?}: {error:?}"));
+                }
                 // The same table gives the same picture, but where a real device's filter has fewer bits.
                 let first = first.get_or_insert_with(|| got.clone());
                 let apart = got.compare(first).unwrap();
-                assert!(apart.rmse < 1e-3, "{engine}, {choice:?}, {emission:?}: {apart:?} from the CPU's");
+                if apart.rmse > 1e-3 {
+                    wrong.push(format!("{engine}, {choice:?}, {emission:?}: {apart:?} from the CPU's"));
+                }
             }
         }
     }
+    assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
 #[test]
