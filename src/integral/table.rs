@@ -3,12 +3,19 @@
 //! Each form is judged by the exact integral, and read here as a device's linear filter reads it: [`Table`] has all three
 //! parameters, [`Polynomial`] the values only, and [`Cylindrical`] planes of two parameters that hold a projected cell each.
 
+mod closed;
 mod cylindrical;
+mod grid;
+mod incremental;
+mod linear;
 mod polynomial;
+mod sampled;
 mod volume;
 
 pub use cylindrical::Cylindrical;
+pub use linear::Linear;
 pub use polynomial::Polynomial;
+pub use sampled::{Sampling, Steps};
 pub use volume::{Kind, Table, coordinate, length};
 
 use super::{Exact, Light};
