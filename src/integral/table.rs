@@ -18,6 +18,11 @@ pub use polynomial::Polynomial;
 pub use sampled::{Sampling, Steps};
 pub use volume::{Kind, Table, coordinate, length};
 
+pub(crate) use grid::Nodes;
+pub(crate) use polynomial::inverse;
+pub(crate) use sampled::entries;
+pub(crate) use volume::OPAQUE_DEPTH;
+
 use super::{Exact, Light};
 use crate::field;
 
@@ -66,4 +71,4 @@ fn published(exact: &Exact<f64>, front: f64, back: f64, l: f64) -> [f64; 4] {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

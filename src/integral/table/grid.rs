@@ -2,6 +2,7 @@
 
 use super::value;
 use crate::integral::Exact;
+use bytemuck::{Pod, Zeroable};
 
 /// A linear piece of the function, as the scalar passes it: extinction and colour at both ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -120,5 +121,56 @@ impl Grid {
             true => emitted.map(|e| (e / whole).max(0.0)),
             false => [0, 1, 2].map(|k| (self.colour[i][k] + self.colour[j][k]) / 2.0),
         }
+    }
+}
+
+/// A [`Grid`] as shaders read it.
+pub(crate) struct Nodes {
+    pub(crate) parts: Vec<PartOf>,
+    /// Where the parts of each interval begin, and their number.
+    pub(crate) begin: Vec<u32>,
+    pub(crate) nodes: Vec<Node>,
+}
+
+/// `Part` in the shader.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct PartOf {
+    front: [f32; 4],
+    back: [f32; 4],
+    share: f32,
+    padding: [f32; 3],
+}
+
+/// `Node` in the shader: integrals as sums of three, as an opaque stretch is 1e15.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Node {
+    sums: [[f32; 4]; 3],
+    constant: [f32; 4],
+    colour: [f32; 4],
+}
+
+impl Nodes {
+    pub(crate) fn new(exact: &Exact<f64>, size: u32) -> Self {
+        let grid = Grid::new(exact, size);
+        let (parts, interval) = &grid.rising;
+        let begin = (0..size).map(|i| interval.partition_point(|&of| of < i) as u32).collect();
+        let node = |i: usize| {
+            let mut sums = [[0.0; 4]; 3];
+            let [r, g, b] = grid.emitted[i];
+            for (k, Sum { high, low }) in [grid.depth[i], r, g, b].into_iter().enumerate() {
+                let first = high as f32;
+                let rest = (high - f64::from(first)) + low;
+                let second = rest as f32;
+                for (of, part) in sums.iter_mut().zip([first, second, (rest - f64::from(second)) as f32]) {
+                    of[k] = part;
+                }
+            }
+            let [r, g, b] = grid.colour[i].map(|c| c as f32);
+            Node { sums, constant: grid.constant[i], colour: [r, g, b, 0.0] }
+        };
+        let part = |p: &Part| PartOf { front: p.front, back: p.back, share: p.share, padding: [0.0; 3] };
+        Nodes { parts: parts.iter().map(part).collect(), begin, nodes: (0..grid.size).map(node).collect() }
     }
 }

@@ -27,7 +27,7 @@ pub struct Polynomial {
 }
 
 /// A sum of powers that goes through points at 0, 1/n, …, 1: the rows give its coefficients from the values there.
-type Inverse = Vec<Vec<f64>>;
+pub(crate) type Inverse = Vec<Vec<f64>>;
 
 impl Polynomial {
     /// Integrates `exact` over segments of up to `longest` normalised units, on the current rayon pool. `None` for fields of
@@ -170,7 +170,7 @@ impl Polynomial {
 }
 
 /// Lagrange's polynomials, multiplied out.
-fn inverse(degree: usize) -> Inverse {
+pub(crate) fn inverse(degree: usize) -> Inverse {
     let at = |i: usize| i as f64 / degree as f64;
     let mut rows = vec![vec![]; degree + 1];
     for j in 0..=degree {

@@ -180,8 +180,13 @@ fn limits_are_finite() {
     assert_eq!(Cylindrical::new(&peak, 6, 33, 1.0), None);
 }
 
-/// Functions of all kinds: ramps, a peak 1 % wide, steps, 256 random entries; which one, and whether it emits directly.
 fn functions() -> Vec<(&'static str, Exact<f64>)> {
+    let exact = |t: &TransferFunction| Exact::new(t, field::Kind::Scalar, &[Normal { mid: 0.0, half: 1.0 }; 4], 1.0);
+    transfers().iter().map(|(name, transfer)| (*name, exact(transfer))).collect()
+}
+
+/// Functions of all kinds: ramps, a peak 1 % wide, steps, 256 random entries; which one, and whether it emits directly.
+pub(crate) fn transfers() -> Vec<(&'static str, TransferFunction)> {
     let mut seed = 77u64;
     let mut unit = move || {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -211,14 +216,14 @@ fn functions() -> Vec<(&'static str, Exact<f64>)> {
                     .for_each(|i| add(-1.0 + 2.0 * f64::from(i) / 255.0, 3.0 * unit(), [unit(), unit(), unit()])),
             }
             let transfer = TransferFunction::new(color, opacity, 1.0).unwrap().with_emission(emission).unwrap();
-            all.push((kind, Exact::new(&transfer, field::Kind::Scalar, &[Normal { mid: 0.0, half: 1.0 }; 4], 1.0)));
+            all.push((kind, transfer));
         }
     }
     all
 }
 
 /// The greatest difference of two lists of texels, relative to the greatest of the channel.
-fn apart_texels(got: &[[f32; 4]], want: &[[f32; 4]]) -> f32 {
+pub(crate) fn apart_texels(got: &[[f32; 4]], want: &[[f32; 4]]) -> f32 {
     assert_eq!(got.len(), want.len());
     let most = want.iter().fold([1e-30f32; 4], |m, t| std::array::from_fn(|k| m[k].max(t[k].abs())));
     let all = got.iter().zip(want).flat_map(|(g, w)| (0..4).map(move |k| (g[k] - w[k]).abs() / most[k]));
@@ -271,7 +276,10 @@ fn published_constructions_come_near() {
                 ];
                 let now = [0, 1, 2].map(|k| apart_from(&made[k], &want));
                 for k in 0..3 {
-                    assert!(now[k] < 0.1 && now[k] < (0.9 * last[k]).max(1e-5), "{name} {kind:?} {n} {k}: {now:?} after {last:?}");
+                    assert!(
+                        now[k] < 0.1 && now[k] < (0.9 * last[k]).max(1e-5),
+                        "{name} {kind:?} {n} {k}: {now:?} after {last:?}"
+                    );
                 }
                 last = now;
             }

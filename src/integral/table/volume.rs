@@ -48,7 +48,7 @@ const LANES: usize = 8;
 const ROWS: usize = 8;
 
 /// Optical depths beyond this are opaque, and so is a mean extinction that gives it to the thinnest slice but 0.
-pub(super) const OPAQUE_DEPTH: f64 = 100.0;
+pub(crate) const OPAQUE_DEPTH: f64 = 100.0;
 
 /// The piecewise linear function along one segment: extinction and colour in front and behind of each piece, and its share of
 /// the length.
