@@ -80,12 +80,12 @@ fn interval(i: u32, rising: bool, step: f32) -> vec4f {
     let last = begin[at + 1u];
     var sum = NOTHING;
     for (var p = begin[at]; p < last; p++) {
-        let of = parts[p];
-        let l = of.share * step;
+        let part = parts[p];
+        let l = part.share * step;
         if rising {
-            sum = over(sum, light_of(of.front, of.back, l));
+            sum = over(sum, light_of(part.front, part.back, l));
         } else {
-            sum = over(light_of(of.back, of.front, l), sum);
+            sum = over(light_of(part.back, part.front, l), sum);
         }
     }
     return sum;
@@ -221,7 +221,7 @@ fn sampled(@builtin(global_invocation_id) id: vec3u) {
     var count = job.samples;
     if count == 0u {
         let apart = abs(f32(j) - f32(i)) / f32(n - 1u);
-        count = max(u32(ceil(job.oversampling * f32(job.entries) * apart)), 1u);
+        count = max(u32(ceil(job.oversampling * f32(job.entries) * apart - 1e-3)), 1u);
     }
     let step = length_of(slice) / f32(count);
     var sum = NOTHING;
@@ -258,11 +258,11 @@ fn doubled(@builtin(global_invocation_id) id: vec3u) {
     if i >= n {
         return;
     }
-    let from = job.first - 1u;
+    let previous = job.first - 1u;
     let low = (i + j) / 2u;
     let high = (i + j + 1u) / 2u;
-    let front = (texel(from, i, low) + texel(from, i, high)) * 0.5;
-    let back = (texel(from, low, j) + texel(from, high, j)) * 0.5;
+    let front = (texel(previous, i, low) + texel(previous, i, high)) * 0.5;
+    let back = (texel(previous, low, j) + texel(previous, high, j)) * 0.5;
     texels[(job.first * n + j) * n + i] = before(front, back);
 }
 
@@ -275,12 +275,12 @@ fn longer(@builtin(global_invocation_id) id: vec3u) {
     if i >= n {
         return;
     }
-    let from = job.first - 1u;
+    let previous = job.first - 1u;
     let middle = f32(i) + (f32(j) - f32(i)) / f32(job.first);
     let low = min(u32(middle), n - 2u);
     let share = middle - f32(low);
     let slab = mix(texel(1u, i, low), texel(1u, i, low + 1u), share);
-    let rest = mix(texel(from, low, j), texel(from, low + 1u, j), share);
+    let rest = mix(texel(previous, low, j), texel(previous, low + 1u, j), share);
     texels[(job.first * n + j) * n + i] = before(slab, rest);
 }
 

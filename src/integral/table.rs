@@ -3,6 +3,7 @@
 //! Each form is judged by the exact integral, and read here as a device's linear filter reads it: [`Table`] has all three
 //! parameters, [`Polynomial`] the values only, and [`Cylindrical`] planes of two parameters that hold a projected cell each.
 
+mod bound;
 mod closed;
 mod cylindrical;
 mod grid;
@@ -12,6 +13,7 @@ mod polynomial;
 mod sampled;
 mod volume;
 
+pub use bound::{bound, size};
 pub use cylindrical::Cylindrical;
 pub use linear::Linear;
 pub use polynomial::Polynomial;

@@ -45,10 +45,13 @@ impl Sampling {
     pub(crate) fn count(&self, apart: f64) -> u32 {
         match self.steps {
             Steps::Same(n) => n.max(1),
-            Steps::Touched(o) => ((o * f64::from(self.entries) * apart / 2.0).ceil() as u32).max(1),
+            Steps::Touched(o) => ((o * f64::from(self.entries) * apart / 2.0 - ROUNDING).ceil() as u32).max(1),
         }
     }
 }
+
+/// Whole numbers of entries that rounding makes a little more are still that.
+const ROUNDING: f64 = 1e-3;
 
 /// The function as a list of `m` entries over [−1, 1]: colour (direct: emission) and extinction.
 pub(crate) fn entries(exact: &Exact<f64>, m: u32) -> Vec<[f32; 4]> {
