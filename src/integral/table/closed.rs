@@ -224,7 +224,7 @@ impl<'a, const L: usize> Rows<'a, L> {
 
 /// 1 − e^{−depth}, accurate relative to itself.
 #[inline(always)]
-fn opacity(depth: f32) -> f32 {
+pub(super) fn opacity(depth: f32) -> f32 {
     let d = depth;
     let thin = d * (1.0 - d / 2.0 * (1.0 - d / 3.0 * (1.0 - d / 4.0 * (1.0 - d / 5.0 * (1.0 - d / 6.0)))));
     if d < 0.25 { thin } else { 1.0 - Real::exp(-d) }

@@ -4,7 +4,7 @@
 //! as the segment touches.
 
 use super::volume::{Kind, Table, length};
-use super::{grid, is_scalar, value};
+use super::{closed, grid, is_scalar, value};
 use crate::integral::Exact;
 use crate::real::Real;
 use rayon::prelude::*;
@@ -114,16 +114,16 @@ fn texel_of(list: &[[f32; 4]], [front, back]: [f32; 2], l: f32, count: u32, dire
     let (mut sum, mut through) = ([0.0; 3], 1.0);
     for i in 0..count {
         let [r, g, b, tau] = entry(list, at + rise * i as f32);
-        let rest = Real::exp(-tau * step);
+        let alpha = closed::opacity(tau * step);
         let seen = match direct {
-            false => 1.0 - rest,
-            true if tau * step > 1e-4 => (1.0 - rest) / tau,
+            false => alpha,
+            true if tau * step > 1e-6 => alpha / tau,
             true => step,
         };
         for (sum, c) in sum.iter_mut().zip([r, g, b]) {
             *sum += through * seen * c;
         }
-        through *= rest;
+        through *= 1.0 - alpha;
     }
     [sum[0], sum[1], sum[2], 1.0 - through]
 }
