@@ -1,5 +1,5 @@
 use crate::render::{self, Request};
-use crate::{output, progress};
+use crate::{output, parse, progress};
 use anyhow::{Context, Result};
 use clap::Args;
 use halite::field::Kind;
@@ -27,6 +27,9 @@ pub(crate) struct Options {
     /// Texels along each axis of the values; of 256, the largest table takes 1 GiB
     #[arg(long, value_name = "N", default_value_t = 128, value_parser = clap::value_parser!(u32).range(2..=256))]
     values: u32,
+    /// Choose values and lengths so that the bound of the uniform volume's error is this, if up to 256 values reach it
+    #[arg(long, value_name = "ERROR", value_parser = parse::positive, conflicts_with = "values")]
+    error: Option<f64>,
     /// Entries of the function where it is sampled
     #[arg(long, value_name = "N", default_value_t = 256, value_parser = clap::value_parser!(u32).range(2..=65_536))]
     entries: u32,
@@ -65,6 +68,8 @@ struct Form<'a> {
     name: &'static str,
     construction: &'static str,
     size: String,
+    /// What errors are below.
+    bound: Option<f64>,
     build: Build<'a>,
 }
 
@@ -73,12 +78,16 @@ struct Row {
     name: &'static str,
     construction: &'static str,
     size: String,
+    bound: Option<f64>,
     bytes: u64,
     build_ms: f64,
     look_up: LookUp,
     rms: f64,
     max: f64,
 }
+
+/// The form whose error has a bound.
+const UNIFORM: &str = "volume, uniform";
 
 /// Pixels of one picture of the sheet, along both axes, and between two of them.
 const SIDE: usize = 96;
@@ -112,9 +121,11 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
         let adaptive = |[front, back, l]: [f64; 3]| {
             reference::segment(transfer, normal[0].invert(front), normal[0].invert(back), l / geometry.scale)
         };
+        let of_error = options.error.and_then(|error| table::size(&exact, longest, error));
+        let [n, _, lengths] = of_error.unwrap_or([options.values, options.values, 64]);
         let rows = progress::during("building", |progress| -> Result<Vec<Row>> {
             let truth: Vec<_> = segments(options.segments, longest).into_par_iter().map(|s| (s, adaptive(s))).collect();
-            let forms = forms(&exact, constructor.as_ref(), longest, options);
+            let forms = forms(&exact, constructor.as_ref(), longest, [n, lengths], options);
             let count = forms.len() as f64;
             let mut rows = Vec::new();
             for (i, form) in forms.into_iter().enumerate() {
@@ -139,7 +150,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
                 .map(|r| {
                     json!({
                         "form": r.name, "construction": r.construction, "size": r.size, "bytes": r.bytes,
-                        "build_ms": r.build_ms, "rms": r.rms, "max": r.max,
+                        "build_ms": r.build_ms, "rms": r.rms, "max": r.max, "bound": r.bound,
                     })
                 })
                 .collect();
@@ -164,21 +175,28 @@ fn row(form: Form<'_>, truth: &[([f64; 3], [f64; 4])]) -> Result<Option<Row>> {
         }
     }
     times.sort_by(f64::total_cmp);
-    let Form { name, construction, size, .. } = form;
+    let Form { name, construction, size, bound, .. } = form;
     let Built { bytes, look_up, .. } = last;
     let [rms, max] = errors(truth, &look_up);
-    Ok(Some(Row { name, construction, size, bytes, build_ms: times[times.len() / 2], look_up, rms, max }))
+    Ok(Some(Row { name, construction, size, bound, bytes, build_ms: times[times.len() / 2], look_up, rms, max }))
 }
 
 /// All forms and constructions.
-fn forms<'a>(exact: &'a Exact<f64>, device: Option<&'a Constructor>, longest: f64, options: &Options) -> Vec<Form<'a>> {
-    let (n, m) = (options.values, options.entries);
+fn forms<'a>(
+    exact: &'a Exact<f64>,
+    device: Option<&'a Constructor>,
+    longest: f64,
+    [n, lengths]: [u32; 2],
+    options: &Options,
+) -> Vec<Form<'a>> {
+    let m = options.entries;
     let mut forms = vec![];
     let mut add = |name, construction, size: String, build: Build<'a>| {
-        forms.push(Form { name, construction, size, build });
+        let bound = if name == UNIFORM { table::bound(exact, n, lengths, longest) } else { None };
+        forms.push(Form { name, construction, size, bound, build });
     };
     for (name, kind, slices) in [
-        ("volume, uniform", table::Kind::Uniform, 64),
+        (UNIFORM, table::Kind::Uniform, lengths),
         ("volume, log", table::Kind::Log, 16),
         ("volume, log-normalised", table::Kind::LogNormalised, 16),
     ] {
@@ -302,13 +320,14 @@ fn errors(truth: &[([f64; 3], [f64; 4])], look_up: &LookUp) -> [f64; 2] {
 
 fn text(rows: &[Row]) -> String {
     let mut text = format!(
-        "{:24} {:20} {:>12} {:>10} {:>10} {:>9} {:>9}\n",
-        "table", "built", "texels", "bytes", "build ms", "rms", "max"
+        "{:24} {:20} {:>12} {:>10} {:>10} {:>9} {:>9} {:>9}\n",
+        "table", "built", "texels", "bytes", "build ms", "rms", "max", "bound"
     );
     for r in rows {
+        let bound = r.bound.map_or("-".into(), |b| format!("{b:.1e}"));
         text += &format!(
-            "{:24} {:20} {:>12} {:>10} {:>10.1} {:>9.1e} {:>9.1e}\n",
-            r.name, r.construction, r.size, r.bytes, r.build_ms, r.rms, r.max
+            "{:24} {:20} {:>12} {:>10} {:>10.1} {:>9.1e} {:>9.1e} {:>9}\n",
+            r.name, r.construction, r.size, r.bytes, r.build_ms, r.rms, r.max, bound
         );
     }
     text

@@ -3,7 +3,7 @@
 use super::cylindrical::{coordinates, place};
 use super::*;
 use crate::field::Normal;
-use crate::transfer::{Emission, TransferFunction};
+use crate::transfer::{Convention, Emission, TransferFunction};
 
 fn exact(opacity: &[(f64, f64)], emission: Emission) -> Exact<f64> {
     let color = vec![(-1.0, [1.0, 0.2, 0.0]), (0.3, [0.0, 0.5, 0.9]), (1.0, [0.4, 0.4, 0.4])];
@@ -175,6 +175,25 @@ fn limits_are_finite() {
         {
             assert!(got.iter().all(|c| c.is_finite()), "{front} {back} {l}: {got:?}");
         }
+    }
+    // A stretch of opacity 1 is as opaque as numbers allow.
+    let color = vec![(-1.0, [1.0, 0.2, 0.0]), (1.0, [0.4, 0.4, 0.4])];
+    let opacity = vec![(-1.0, 0.0), (-0.2, 1.0), (0.2, 1.0), (0.5, 0.0), (1.0, 0.0)];
+    let opaque = TransferFunction::new(color, opacity, 1.0).unwrap().with_convention(Convention::Opacity);
+    let opaque = Exact::new(&opaque, field::Kind::Scalar, &[Normal { mid: 0.0, half: 1.0 }; 4], 1.0);
+    for (exact, longest) in [(&peak, 1.0), (&opaque, 1.0), (&opaque, 1e-6), (&opaque, 1e6), (&peak, 1e-30)] {
+        for kind in [Kind::Uniform, Kind::Log, Kind::LogNormalised] {
+            let size = [17, 17, 12];
+            let made = [Table::closed(exact, kind, size, longest), Table::incremental(exact, kind, size, longest)];
+            for table in made.iter().flatten() {
+                assert!(table.texels.as_flattened().iter().all(|v| v.is_finite() && *v >= 0.0), "{kind:?}, {longest}");
+            }
+            let want = Table::new(exact, kind, size, longest).unwrap();
+            let apart = apart_texels(&made[0].as_ref().unwrap().texels, &want.texels);
+            assert!(apart < 2e-5, "{kind:?}, {longest}: {apart}");
+        }
+        let polynomial = Polynomial::closed(exact, 4, 17, longest).unwrap();
+        assert!(polynomial.texels.iter().all(|t| t.as_flattened().iter().all(|v| v.is_finite())), "{longest}");
     }
     assert_eq!(Polynomial::new(&peak, 0, 33, 1.0), None);
     assert_eq!(Cylindrical::new(&peak, 6, 33, 1.0), None);
