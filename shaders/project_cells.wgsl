@@ -20,12 +20,12 @@ struct Part {
 
 /// Relative to the frame's base.
 fn place(p: Point) -> vec3f {
-    return (vec3f(p.x, p.y, p.z) - frame.base.xyz) + (vec3f(p.x_low, p.y_low, p.z_low) - frame.base_low.xyz);
+    return (high_of(p) - frame.base.xyz) + (low_of(p) - frame.base_low.xyz);
 }
 
 /// From one point to another: as accurate as it is short.
 fn way(a: Point, b: Point) -> vec3f {
-    return (vec3f(b.x, b.y, b.z) - vec3f(a.x, a.y, a.z)) + (vec3f(b.x_low, b.y_low, b.z_low) - vec3f(a.x_low, a.y_low, a.z_low));
+    return (high_of(b) - high_of(a)) + (low_of(b) - low_of(a));
 }
 
 /// A tetrahedron: its corners, and the ways from the first to the others.

@@ -123,6 +123,15 @@ fn cut(whole: array<vec3f, 4>, whole_values: array<Value, 4>, piece: u32) -> Pie
     return Piece(p, v, true);
 }
 
+/// The corners of an outline so that it turns anticlockwise. Where rounding puts the thickest point outside, one triangle of the fan turns
+/// the other way: it lies on the others, and is not drawn.
+fn anticlockwise(corners: array<vec3f, 4>, around: vec4u) -> vec4u {
+    var p = corners;
+    let a = pixel_of(seen(p[around.z])) - pixel_of(seen(p[around.x]));
+    let b = pixel_of(seen(p[around.w])) - pixel_of(seen(p[around.y]));
+    return select(around, around.xwzy, a.x * b.y - a.y * b.x > 0.0);
+}
+
 fn record_of(whole: Solid, values: array<Value, 4>, piece: u32, rank: u32) -> Record {
     let corners = whole.p;
     var p = corners;
@@ -136,7 +145,7 @@ fn record_of(whole: Solid, values: array<Value, 4>, piece: u32, rank: u32) -> Re
         v = left.v;
     }
     let a = dependency(p);
-    let around = outline(a);
+    let around = anticlockwise(p, outline(a));
     // Both sides of Σ a p = 0 give the same pixel: the front and the back of the thickest point.
     let positive = max(a, vec4f(0.0));
     let negative = max(-a, vec4f(0.0));

@@ -261,7 +261,7 @@ fn face_of(ray: Ray, ids: vec3u) -> Face {
 
 fn position(i: u32) -> Twice {
     let p = points(i);
-    return Twice(vec3f(p.x, p.y, p.z), vec3f(p.x_low, p.y_low, p.z_low));
+    return Twice(high_of(p), low_of(p));
 }
 
 /// Walks from an entry until the ray leaves the mesh or ends; false if it got lost.

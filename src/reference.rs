@@ -38,6 +38,14 @@ pub struct Reference<'a> {
     extent: f64,
 }
 
+/// What a segment of `length` world units emits and absorbs, premultiplied RGBA, whose field of one component, in the array's own
+/// units, is linear from `front`, where the ray enters, to `back`.
+pub fn segment(transfer: &TransferFunction, front: f64, back: f64, length: f64) -> [f64; 4] {
+    let alone = Reference { transfer, kind: Kind::Scalar, cells: vec![], centre: DVec3::ZERO, extent: 0.0 };
+    let interval = Interval { t: [0.0, length], values: [front, back].map(|s| [s, 0.0, 0.0, 0.0]) };
+    alone.composite(std::iter::once(interval))
+}
+
 /// One visible tetrahedron.
 #[derive(Debug)]
 struct Tetrahedron {

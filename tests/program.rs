@@ -369,19 +369,28 @@ fn tables_are_compared() {
     place.misused("tables cube.vtu --values 1", "--values");
     place.misused("tables cube.vtu --values 1024", "--values");
     // No form is left out where the numbers are odd.
-    let Ran(_, out, _) = place.run("tables cube.vtu --values 7 --segments 1");
-    assert_eq!(out.lines().count(), 10, "{out}");
+    let Ran(_, out, _) = place.run("tables cube.vtu --values 7 --segments 1 --device cpu");
+    assert_eq!(out.lines().count(), 33, "{out}");
     let Ran(code, out, err) =
-        place.run("tables cube.vtu --values 32 --segments 2000 --out sheet.png --json tables.json");
+        place.run("tables cube.vtu --values 32 --segments 2000 --out sheet.png --tiles tiles.png --json tables.json");
     assert_eq!((code, err.as_str()), (Some(0), ""));
     assert!(out.contains("log-normalised") && out.contains("cylindrical"), "{out}");
     let tables: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(place.path("tables.json")).unwrap()).unwrap();
-    let rms = |form: &str| {
-        let row = tables["tables"].as_array().unwrap().iter().find(|t| t["form"] == form);
+    let Ran(_, out, _) = place.run("tables cube.vtu --error 0.9 --segments 1 --device cpu");
+    assert!(out.contains("volume, uniform") && out.contains("closed"), "{out}");
+    let rms = |form: &str, construction: &str| {
+        let rows = tables["tables"].as_array().unwrap();
+        let row = rows.iter().find(|t| t["form"] == form && t["construction"] == construction);
         row.unwrap()["rms"].as_f64().unwrap()
     };
-    assert!(rms("volume, log-normalised") < 0.02 && rms("polynomial, degree 2") < 0.02, "{tables}");
-    let sheet = std::fs::read(place.path("sheet.png")).unwrap();
-    assert!(sheet.starts_with(b"\x89PNG"));
+    for construction in ["f64", "closed"] {
+        assert!(rms("volume, log-normalised", construction) < 0.02, "{tables}");
+        assert!(rms("polynomial, degree 2", construction) < 0.02, "{tables}");
+    }
+    assert!(rms("polynomial, degree 2", "closed, 16 bits") < rms("linear opacity", "closed"), "{tables}");
+    assert!(rms("volume, uniform", "incremental") < 0.05 && rms("volume, log", "sliced") < 0.1, "{tables}");
+    for picture in ["sheet.png", "tiles.png"] {
+        assert!(std::fs::read(place.path(picture)).unwrap().starts_with(b"\x89PNG"));
+    }
 }

@@ -6,8 +6,12 @@ use crate::error::Result;
 use crate::geometry::{Geometry, Values};
 use glam::DVec3;
 
-/// An element of [`points`]: each coordinate is the sum of two.
-pub(crate) const POINT: &str = "struct Point { x: f32, y: f32, z: f32, x_low: f32, y_low: f32, z_low: f32 }\n";
+/// An element of [`points`]: each coordinate is the sum of two. They are read in pairs, as devices in software take each read for itself.
+pub(crate) const POINT: &str = "\
+struct Point { xy: vec2f, z_and_low_x: vec2f, low_yz: vec2f }
+fn high_of(p: Point) -> vec3f { return vec3f(p.xy, p.z_and_low_x.x); }
+fn low_of(p: Point) -> vec3f { return vec3f(p.z_and_low_x.y, p.low_yz); }
+";
 
 /// Stands for a value that is not finite; shaders take all above 1e38 for such.
 pub(crate) const INVISIBLE: f32 = 3e38;

@@ -197,13 +197,14 @@ pub(crate) fn compute(
     })
 }
 
-/// A pipeline of the entry points "vertex" and "fragment" that draws triangles, seen from both sides, onto one picture.
+/// A pipeline of the entry points "vertex" and "fragment" that draws triangles onto one picture, but for those `culled`.
 pub(crate) fn render(
     gpu: &Gpu,
     module: &wgpu::ShaderModule,
     layout: &wgpu::PipelineLayout,
     format: wgpu::TextureFormat,
     blend: wgpu::BlendComponent,
+    culled: Option<wgpu::Face>,
 ) -> wgpu::RenderPipeline {
     gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some("draw"),
@@ -214,7 +215,7 @@ pub(crate) fn render(
             compilation_options: Default::default(),
             buffers: &[],
         },
-        primitive: wgpu::PrimitiveState::default(),
+        primitive: wgpu::PrimitiveState { cull_mode: culled, ..Default::default() },
         depth_stencil: None,
         multisample: wgpu::MultisampleState::default(),
         fragment: Some(wgpu::FragmentState {

@@ -3,13 +3,27 @@
 //! Each form is judged by the exact integral, and read here as a device's linear filter reads it: [`Table`] has all three
 //! parameters, [`Polynomial`] the values only, and [`Cylindrical`] planes of two parameters that hold a projected cell each.
 
+mod bound;
+mod closed;
 mod cylindrical;
+mod grid;
+mod incremental;
+mod linear;
 mod polynomial;
+mod sampled;
 mod volume;
 
+pub use bound::{bound, size};
 pub use cylindrical::Cylindrical;
+pub use linear::Linear;
 pub use polynomial::Polynomial;
+pub use sampled::{Sampling, Steps};
 pub use volume::{Kind, Table, coordinate, length};
+
+pub(crate) use grid::Nodes;
+pub(crate) use polynomial::inverse;
+pub(crate) use sampled::entries;
+pub(crate) use volume::OPAQUE_DEPTH;
 
 use super::{Exact, Light};
 use crate::field;
@@ -59,4 +73,4 @@ fn published(exact: &Exact<f64>, front: f64, back: f64, l: f64) -> [f64; 4] {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

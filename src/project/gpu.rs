@@ -251,7 +251,7 @@ impl Project {
         let one_plane = table.is_some_and(|t| t.choice().per_cell) || view.eye().is_none();
         limits.plane_per_cell = one_plane && switches.fragments != Fragments::Intersected;
         let source = program(&variant, association, switches, table.map(|t| &**t), limits, &arrays);
-        self.compile(&arrays, source, switches.compositing, format)?;
+        self.compile(&arrays, source, switches, format)?;
         self.prepare_canvas::<N>(switches.fragments, view.size(), format)?;
         let frame = Pass::new(self, &seen)?;
         let mut counts = Counts::default();
@@ -301,9 +301,10 @@ impl Project {
         &mut self,
         arrays: &[Array],
         source: String,
-        compositing: Compositing,
+        switches: &Switches,
         format: wgpu::TextureFormat,
     ) -> Result<()> {
+        let compositing = switches.compositing;
         let same = |p: &Program| p.source == source && p.format == format && p.compositing == compositing;
         if self.program.as_ref().is_some_and(same) {
             return Ok(());
@@ -322,10 +323,12 @@ impl Project {
             },
             operation: wgpu::BlendOperation::Add,
         };
+        // The outline of an intersected cell may be no more than that: grown, it need not turn one way.
+        let culled = (switches.fragments != Fragments::Intersected).then_some(wgpu::Face::Back);
         let program = Program {
             classify: raster::compute(gpu, &module, "classify", &cells),
             project: raster::compute(gpu, &module, "project_all", &cells),
-            draw: raster::render(gpu, &module, &drawing, format, blend),
+            draw: raster::render(gpu, &module, &drawing, format, blend, culled),
             arrays: array_layout,
             source,
             format,

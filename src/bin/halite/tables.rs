@@ -1,22 +1,25 @@
 use crate::render::{self, Request};
-use crate::{output, progress};
+use crate::{output, parse, progress};
 use anyhow::{Context, Result};
 use clap::Args;
 use halite::field::Kind;
 use halite::geometry::Geometry;
 use halite::gpu::DeviceChoice;
+use halite::gpu::construct::{Construction, Constructor};
 use halite::image::{Backdrop, Image};
-use halite::integral::table::{self, Cylindrical, Polynomial, Table};
+use halite::integral::table::{self, Cylindrical, Linear, Polynomial, Sampling, Table};
 use halite::integral::{Exact, Light};
+use halite::reference;
 use halite::render::Renderer;
+use rayon::prelude::*;
 use serde_json::json;
 use std::path::PathBuf;
 use std::time::Instant;
 
 /// Compare pre-integrated tables of a scene's transfer function
 ///
-/// Builds each published form of table for the scene's cells, and tells its size, the time that took, and its errors against the
-/// exact integral, over segments with any values and lengths.
+/// Builds each published form of table for the scene's cells, in each way that is known, and tells its size, the time that took, and its
+/// errors against adaptive integration in 64 bits, over segments with any values and lengths. With --device, a device builds them too.
 #[derive(Args)]
 pub(crate) struct Options {
     #[command(flatten)]
@@ -24,8 +27,14 @@ pub(crate) struct Options {
     /// Texels along each axis of the values; of 256, the largest table takes 1 GiB
     #[arg(long, value_name = "N", default_value_t = 128, value_parser = clap::value_parser!(u32).range(2..=256))]
     values: u32,
+    /// Choose values and lengths so that the bound of the uniform volume's error is this, if up to 256 values reach it
+    #[arg(long, value_name = "ERROR", value_parser = parse::positive, conflicts_with = "values")]
+    error: Option<f64>,
+    /// Entries of the function where it is sampled
+    #[arg(long, value_name = "N", default_value_t = 256, value_parser = clap::value_parser!(u32).range(2..=65_536))]
+    entries: u32,
     /// Segments that are compared
-    #[arg(long, value_name = "N", default_value_t = 50_000, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1..))]
     segments: u32,
     /// How much differences are magnified
     #[arg(long, value_name = "GAIN", default_value_t = 8.0)]
@@ -33,6 +42,9 @@ pub(crate) struct Options {
     /// A sheet, a row for each form: the table at four lengths, each beside its difference from the exact integral (.png)
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// The planes of the cylindrical table as tiles of one picture (.png)
+    #[arg(long, value_name = "FILE")]
+    tiles: Option<PathBuf>,
     /// Write sizes, times and errors as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -41,16 +53,41 @@ pub(crate) struct Options {
 /// Premultiplied colour and opacity by the values in front and behind and the length of a segment.
 type LookUp = Box<dyn Fn(f64, f64, f64) -> [f64; 4] + Sync>;
 
-/// A table that was built.
-struct Row {
-    name: String,
+/// A table that was built: its bytes, the milliseconds where a device says them, and how it is looked up.
+struct Built {
+    bytes: u64,
+    ms: Option<f64>,
+    look_up: LookUp,
+}
+
+/// Builds a table; `None` if there is none of the size.
+type Build<'a> = Box<dyn Fn() -> Result<Option<Built>> + 'a>;
+
+/// A form of table, and a way to build it.
+struct Form<'a> {
+    name: &'static str,
+    construction: &'static str,
     size: String,
+    /// What errors are below.
+    bound: Option<f64>,
+    build: Build<'a>,
+}
+
+/// A table that was built and judged.
+struct Row {
+    name: &'static str,
+    construction: &'static str,
+    size: String,
+    bound: Option<f64>,
     bytes: u64,
     build_ms: f64,
     look_up: LookUp,
     rms: f64,
     max: f64,
 }
+
+/// The form whose error has a bound.
+const UNIFORM: &str = "volume, uniform";
 
 /// Pixels of one picture of the sheet, along both axes, and between two of them.
 const SIDE: usize = 96;
@@ -60,93 +97,195 @@ const MARGIN: usize = 4;
 const LENGTHS: [f64; 4] = [0.0625, 0.25, 0.5, 1.0];
 
 pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
-    if let Some(path) = &options.out {
+    for path in options.out.iter().chain(&options.tiles) {
         output::check_picture(path)?;
     }
     if let Some(path) = &options.json {
         output::check(path)?;
     }
     let given = options.request.scene()?;
+    let device = options.request.device(given.as_ref()).or_environment();
     let renderer = Renderer::with_device(threads, DeviceChoice::Cpu)?;
     renderer.install(|| {
         let job = render::prepare(&options.request, given)?;
         let points = job.tetrahedra.points(job.mesh.points());
         let geometry = Geometry::unconnected(&points, &job.tetrahedra);
         let normal = [0, 1, 2, 3].map(|k| job.field.normal(k));
-        let exact = Exact::<f64>::new(&job.scene.transfer, job.field.kind(), &normal, geometry.scale);
         if job.field.kind() != Kind::Scalar {
             anyhow::bail!("tables are for fields of one component; choose one with --component");
         }
-        let rows = progress::during("building", |p| rows(&exact, geometry.longest_edge(), options, p));
+        let transfer = &job.scene.transfer;
+        let exact = Exact::<f64>::new(transfer, Kind::Scalar, &normal, geometry.scale);
+        let constructor = Constructor::open(&device, transfer, &normal, geometry.scale)?;
+        let longest = geometry.longest_edge();
+        let adaptive = |[front, back, l]: [f64; 3]| {
+            reference::segment(transfer, normal[0].invert(front), normal[0].invert(back), l / geometry.scale)
+        };
+        let of_error = options.error.and_then(|error| table::size(&exact, longest, error));
+        let [n, _, lengths] = of_error.unwrap_or([options.values, options.values, 64]);
+        let rows = progress::during("building", |progress| -> Result<Vec<Row>> {
+            let truth: Vec<_> = segments(options.segments, longest).into_par_iter().map(|s| (s, adaptive(s))).collect();
+            let forms = forms(&exact, constructor.as_ref(), longest, [n, lengths], options);
+            let count = forms.len() as f64;
+            let mut rows = Vec::new();
+            for (i, form) in forms.into_iter().enumerate() {
+                progress(i as f64 / count);
+                rows.extend(row(form, &truth)?);
+            }
+            Ok(rows)
+        })?;
         output::print(&text(&rows))?;
         if let Some(path) = &options.out {
-            sheet(&rows, &exact, geometry.longest_edge(), options.gain).save(path, Backdrop::Color([0.0; 3]))?;
+            sheet(&rows, &exact, longest, options.gain).save(path, Backdrop::Color([0.0; 3]))?;
+        }
+        if let Some(path) = &options.tiles {
+            let planes = options.values.next_multiple_of(4);
+            let table =
+                Cylindrical::closed(&exact, planes, options.values, longest).context("there is no such table")?;
+            tiled(&table).save(path, Backdrop::Color([0.0; 3]))?;
         }
         if let Some(path) = &options.json {
             let all: Vec<_> = rows
                 .iter()
                 .map(|r| {
                     json!({
-                        "form": r.name, "size": r.size, "bytes": r.bytes, "build_ms": r.build_ms, "rms": r.rms, "max": r.max,
+                        "form": r.name, "construction": r.construction, "size": r.size, "bytes": r.bytes,
+                        "build_ms": r.build_ms, "rms": r.rms, "max": r.max, "bound": r.bound,
                     })
                 })
                 .collect();
-            std::fs::write(path, format!("{:#}\n", json!({ "tables": all }))).with_context(|| path.display().to_string())?;
+            std::fs::write(path, format!("{:#}\n", json!({ "tables": all })))
+                .with_context(|| path.display().to_string())?;
         }
         Ok(())
     })
 }
 
-/// Builds and judges all forms.
-fn rows(exact: &Exact<f64>, longest: f64, options: &Options, progress: &dyn Fn(f64)) -> Vec<Row> {
-    let n = options.values;
+/// Builds a table, several times if that is quick, and judges it.
+fn row(form: Form<'_>, truth: &[([f64; 3], [f64; 4])]) -> Result<Option<Row>> {
+    let (mut times, begun) = (vec![], Instant::now());
+    let mut last;
+    loop {
+        let start = Instant::now();
+        let Some(built) = (form.build)()? else { return Ok(None) };
+        times.push(built.ms.unwrap_or_else(|| start.elapsed().as_secs_f64() * 1e3));
+        last = built;
+        if times.len() == 5 || begun.elapsed().as_secs_f64() > 0.5 {
+            break;
+        }
+    }
+    times.sort_by(f64::total_cmp);
+    let Form { name, construction, size, bound, .. } = form;
+    let Built { bytes, look_up, .. } = last;
+    let [rms, max] = errors(truth, &look_up);
+    Ok(Some(Row { name, construction, size, bound, bytes, build_ms: times[times.len() / 2], look_up, rms, max }))
+}
+
+/// All forms and constructions.
+fn forms<'a>(
+    exact: &'a Exact<f64>,
+    device: Option<&'a Constructor>,
+    longest: f64,
+    [n, lengths]: [u32; 2],
+    options: &Options,
+) -> Vec<Form<'a>> {
+    let m = options.entries;
+    let mut forms = vec![];
+    let mut add = |name, construction, size: String, build: Build<'a>| {
+        let bound = if name == UNIFORM { table::bound(exact, n, lengths, longest) } else { None };
+        forms.push(Form { name, construction, size, bound, build });
+    };
+    for (name, kind, slices) in [
+        (UNIFORM, table::Kind::Uniform, lengths),
+        ("volume, log", table::Kind::Log, 16),
+        ("volume, log-normalised", table::Kind::LogNormalised, 16),
+    ] {
+        let (size, text) = ([n, n, slices], format!("{n}x{n}x{slices}"));
+        let sampling = [Sampling::same(m, 1.0), Sampling::touched(m, 2.0)];
+        let mut volume = |construction, make: Box<dyn Fn() -> Option<Table> + 'a>| {
+            add(name, construction, text.clone(), Box::new(move || Ok(make().map(of_volume))));
+        };
+        volume("f64", Box::new(move || Table::new(exact, kind, size, longest)));
+        volume("closed", Box::new(move || Table::closed(exact, kind, size, longest)));
+        if kind != table::Kind::LogNormalised {
+            volume("sliced", Box::new(move || Table::sampled(exact, kind, size, longest, sampling[0])));
+            volume("software", Box::new(move || Table::sampled(exact, kind, size, longest, sampling[1])));
+            volume("incremental", Box::new(move || Table::incremental(exact, kind, size, longest)));
+        }
+        for (construction, how) in [
+            ("device, closed", Construction::Closed),
+            ("device, sliced", Construction::Sampled(sampling[0])),
+            ("device, software", Construction::Sampled(sampling[1])),
+            ("device, incremental", Construction::Incremental),
+        ] {
+            let Some(device) = device else { break };
+            let build = move || {
+                let built = device.volume(kind, size, longest, how)?;
+                Ok(built.map(|(table, ms)| Built { ms: Some(ms), ..of_volume(table) }))
+            };
+            add(name, construction, text.clone(), Box::new(build));
+        }
+    }
+    let size = format!("{n}x{n}");
+    add("linear opacity", "f64", size.clone(), Box::new(move || Ok(Linear::new(exact, n, longest).map(of_linear))));
+    add("linear opacity", "closed", size, Box::new(move || Ok(Linear::closed(exact, n, longest).map(of_linear))));
+    for (name, degree) in [("polynomial, degree 1", 1), ("polynomial, degree 2", 2), ("polynomial, degree 4", 4)] {
+        let size = format!("{n}x{n}x{}", degree + 1);
+        let mut polynomial = |construction, bits: u32, make: Box<dyn Fn() -> Option<Polynomial> + 'a>| {
+            let build = move || Ok(make().map(|table| of_polynomial(table, bits)));
+            add(name, construction, size.clone(), Box::new(build));
+        };
+        let closed = move || Polynomial::closed(exact, degree, n, longest);
+        polynomial("f64", 32, Box::new(move || Polynomial::new(exact, degree, n, longest)));
+        polynomial("closed", 32, Box::new(closed));
+        polynomial("closed, 16 bits", 16, Box::new(move || closed().map(|t| t.rounded(16))));
+        polynomial("closed, 8 bits", 8, Box::new(move || closed().map(|t| t.rounded(8))));
+        if let Some(device) = device {
+            let build = move || {
+                let built = device.polynomial(degree, n, longest)?;
+                Ok(built.map(|(table, ms)| Built { ms: Some(ms), ..of_polynomial(table, 32) }))
+            };
+            add(name, "device, closed", size, Box::new(build));
+        }
+    }
     // A cylinder has a plane at each bend of its mapping, which are a quarter apart.
     let planes = n.next_multiple_of(4);
-    let forms: [(&str, String, Build); 9] = [
-        ("volume, uniform", format!("{n}x{n}x64"), volume(table::Kind::Uniform, [n, n, 64])),
-        ("volume, log", format!("{n}x{n}x16"), volume(table::Kind::Log, [n, n, 16])),
-        ("volume, log-normalised", format!("{n}x{n}x16"), volume(table::Kind::LogNormalised, [n, n, 16])),
-        ("polynomial, degree 1", format!("{n}x{n}x2"), polynomial(1, n)),
-        ("polynomial, degree 2", format!("{n}x{n}x3"), polynomial(2, n)),
-        ("polynomial, degree 4", format!("{n}x{n}x5"), polynomial(4, n)),
-        ("cylindrical, n planes", format!("{n}x{n}x{planes}"), cylindrical(planes, n)),
-        ("cylindrical, 2 n planes", format!("{n}x{n}x{}", 2 * planes), cylindrical(2 * planes, n)),
-        ("cylindrical, 4 n planes", format!("{n}x{n}x{}", 4 * planes), cylindrical(4 * planes, n)),
-    ];
-    let mut rows = Vec::new();
-    for (i, (name, size, build)) in forms.into_iter().enumerate() {
-        progress(i as f64 / 9.0);
-        let start = Instant::now();
-        let Some((bytes, look_up)) = build(exact, longest) else { continue };
-        let build_ms = start.elapsed().as_secs_f64() * 1e3;
-        let [rms, max] = errors(exact, longest, options.segments, &look_up);
-        rows.push(Row { name: name.into(), size, bytes, build_ms, look_up, rms, max });
+    for (name, planes) in [
+        ("cylindrical, n planes", planes),
+        ("cylindrical, 2 n planes", 2 * planes),
+        ("cylindrical, 4 n planes", 4 * planes),
+    ] {
+        let size = format!("{n}x{n}x{planes}");
+        let f64 = move || Ok(Cylindrical::new(exact, planes, n, longest).map(of_cylinder));
+        let closed = move || Ok(Cylindrical::closed(exact, planes, n, longest).map(of_cylinder));
+        add(name, "f64", size.clone(), Box::new(f64));
+        add(name, "closed", size.clone(), Box::new(closed));
+        if let Some(device) = device {
+            let build = move || {
+                let built = device.cylindrical(planes, n, longest)?;
+                Ok(built.map(|(table, ms)| Built { ms: Some(ms), ..of_cylinder(table) }))
+            };
+            add(name, "device, closed", size, Box::new(build));
+        }
     }
-    rows
+    forms
 }
 
-/// Builds a table, if there is one of the size: its bytes, and how it is looked up.
-type Build = Box<dyn Fn(&Exact<f64>, f64) -> Option<(u64, LookUp)>>;
-
-fn volume(kind: table::Kind, size: [u32; 3]) -> Build {
-    Box::new(move |exact, longest| {
-        let table = Table::new(exact, kind, size, longest)?;
-        Some((table.bytes(), Box::new(move |f, b, l| table.look_up(f, b, l))))
-    })
+fn of_volume(table: Table) -> Built {
+    Built { bytes: table.bytes(), ms: None, look_up: Box::new(move |f, b, l| table.look_up(f, b, l)) }
 }
 
-fn polynomial(degree: u32, size: u32) -> Build {
-    Box::new(move |exact, longest| {
-        let table = Polynomial::new(exact, degree, size, longest)?;
-        Some((table.bytes(), Box::new(move |f, b, l| table.look_up(f, b, l))))
-    })
+fn of_polynomial(table: Polynomial, bits: u32) -> Built {
+    let bytes = table.bytes() * u64::from(bits) / 32;
+    Built { bytes, ms: None, look_up: Box::new(move |f, b, l| table.look_up(f, b, l)) }
 }
 
-fn cylindrical(planes: u32, size: u32) -> Build {
-    Box::new(move |exact, longest| {
-        let table = Cylindrical::new(exact, planes, size, longest)?;
-        Some((table.bytes(), Box::new(move |f, b, l| table.look_up(f, b, l))))
-    })
+fn of_cylinder(table: Cylindrical) -> Built {
+    Built { bytes: table.bytes(), ms: None, look_up: Box::new(move |f, b, l| table.look_up(f, b, l)) }
+}
+
+fn of_linear(table: Linear) -> Built {
+    Built { bytes: table.bytes(), ms: None, look_up: Box::new(move |f, b, l| table.look_up(f, b, l)) }
 }
 
 fn truth(exact: &Exact<f64>, front: f64, back: f64, l: f64) -> [f64; 4] {
@@ -156,32 +295,55 @@ fn truth(exact: &Exact<f64>, front: f64, back: f64, l: f64) -> [f64; 4] {
     [r, g, b, 1.0 - light.through]
 }
 
-/// The root mean square and the greatest error of all channels, over segments along three additive sequences (Roberts 2018).
-fn errors(exact: &Exact<f64>, longest: f64, segments: u32, look_up: &LookUp) -> [f64; 2] {
+/// Values in front and behind and lengths of segments along three additive sequences (Roberts 2018).
+fn segments(count: u32, longest: f64) -> Vec<[f64; 3]> {
     let steps = [0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_3];
-    let (mut sum, mut most) = (0.0, 0.0f64);
-    for i in 0..segments {
+    let segment = |i: u32| {
         let [front, back, l] = steps.map(|s| (0.5 + s * f64::from(i)).fract());
-        let (front, back, l) = (2.0 * front - 1.0, 2.0 * back - 1.0, l * longest);
-        let (got, want) = (look_up(front, back, l), truth(exact, front, back, l));
+        [2.0 * front - 1.0, 2.0 * back - 1.0, l * longest]
+    };
+    (0..count).map(segment).collect()
+}
+
+/// The root mean square and the greatest error of all channels.
+fn errors(truth: &[([f64; 3], [f64; 4])], look_up: &LookUp) -> [f64; 2] {
+    let (mut sum, mut most) = (0.0, 0.0f64);
+    for ([front, back, l], want) in truth {
+        let got = look_up(*front, *back, *l);
         for k in 0..4 {
             let e = (got[k] - want[k]).abs();
             (sum, most) = (sum + e * e, most.max(e));
         }
     }
-    [(sum / (4.0 * f64::from(segments))).sqrt(), most]
+    [(sum / (4.0 * truth.len() as f64)).sqrt(), most]
 }
 
 fn text(rows: &[Row]) -> String {
-    let mut text =
-        format!("{:24} {:>12} {:>10} {:>10} {:>9} {:>9}\n", "table", "texels", "bytes", "build ms", "rms", "max");
+    let mut text = format!(
+        "{:24} {:20} {:>12} {:>10} {:>10} {:>9} {:>9} {:>9}\n",
+        "table", "built", "texels", "bytes", "build ms", "rms", "max", "bound"
+    );
     for r in rows {
+        let bound = r.bound.map_or("-".into(), |b| format!("{b:.1e}"));
         text += &format!(
-            "{:24} {:>12} {:>10} {:>10.1} {:>9.1e} {:>9.1e}\n",
-            r.name, r.size, r.bytes, r.build_ms, r.rms, r.max
+            "{:24} {:20} {:>12} {:>10} {:>10.1} {:>9.1e} {:>9.1e} {:>9}\n",
+            r.name, r.construction, r.size, r.bytes, r.build_ms, r.rms, r.max, bound
         );
     }
     text
+}
+
+/// The planes beside and below each other, each with s to the right and t downward.
+fn tiled(table: &Cylindrical) -> Image {
+    let (size, planes) = (table.size as usize, table.planes as usize);
+    let columns = (planes as f64).sqrt().ceil() as usize;
+    let [width, height] = [columns * size, planes.div_ceil(columns) * size];
+    let mut picture = Image::new([width as u32, height as u32]);
+    for (at, &texel) in table.texels.iter().enumerate() {
+        let (s, t, plane) = (at % size, at / size % size, at / size / size);
+        picture.pixels[(plane / columns * size + t) * width + plane % columns * size + s] = texel;
+    }
+    picture
 }
 
 /// A row for each table: at each length the table, values in front to the right and values behind downward, and its difference from

@@ -4,7 +4,9 @@
 //! α = 1 − e^{−l ρ̂}. The colour over α hardly depends on the length: it is a polynomial of degree n in l/l_max, through its
 //! values at l = (i/n) l_max, the first of which is its limit. So n + 1 tables of two parameters stand for one of three.
 
-use super::volume::{Pieces, normalised};
+use super::closed::{self, Lanes, Rows};
+use super::grid::Grid;
+use super::volume::{OPAQUE_DEPTH, Pieces, normalised};
 use super::{between, is_scalar, reconstructed, value};
 use crate::integral::Exact;
 use rayon::prelude::*;
@@ -25,7 +27,7 @@ pub struct Polynomial {
 }
 
 /// A sum of powers that goes through points at 0, 1/n, …, 1: the rows give its coefficients from the values there.
-type Inverse = Vec<Vec<f64>>;
+pub(crate) type Inverse = Vec<Vec<f64>>;
 
 impl Polynomial {
     /// Integrates `exact` over segments of up to `longest` normalised units, on the current rayon pool. `None` for fields of
@@ -57,6 +59,71 @@ impl Polynomial {
         Some(Polynomial { degree, size, longest, direct: exact.direct, texels })
     }
 
+    /// The same table, to f32, in a time per texel that does not depend on the function (`closed.rs` says how), up to degree 4.
+    pub fn closed(exact: &Exact<f64>, degree: u32, size: u32, longest: f64) -> Option<Self> {
+        // Of higher degrees, coefficients are great sums of both signs, which f32 does not hold.
+        if size < 3 || degree > 4 {
+            return Self::new(exact, degree, size, longest);
+        }
+        if !is_scalar(exact) || degree == 0 {
+            return None;
+        }
+        let grid = Grid::new(exact, size);
+        let texels = match degree {
+            1 => Self::fill::<1>(&grid, 1, longest),
+            2 => Self::fill::<2>(&grid, 2, longest),
+            _ => Self::fill::<4>(&grid, degree as usize, longest),
+        };
+        Some(Polynomial { degree, size, longest, direct: exact.direct, texels })
+    }
+
+    fn fill<const L: usize>(grid: &Grid, degree: usize, longest: f64) -> Vec<Vec<[f32; 4]>> {
+        let n = grid.size;
+        let inverse = inverse(degree);
+        let mut weights = [[0.0; 5]; 5];
+        for (row, of) in weights.iter_mut().zip(&inverse) {
+            row.iter_mut().zip(of).for_each(|(w, of)| *w = *of as f32);
+        }
+        // The first point is a limit; lanes beyond the last have no weight.
+        let lengths: [f32; L] = std::array::from_fn(|l| (longest * (l + 1).min(degree) as f64 / degree as f64) as f32);
+        let most = (OPAQUE_DEPTH / f64::from(lengths[0])) as f32;
+        // Rows of the sheared table, so that each is written by one thread.
+        let mut sheared = vec![Lanes([[0.0; L]; 4]); n * n];
+        let mut limits = vec![[0.0; 3]; n * n];
+        sheared.par_chunks_mut(n).zip(limits.par_chunks_mut(n)).enumerate().for_each_init(
+            || Rows::new(grid, lengths),
+            |rows, (r, (row, limits))| {
+                rows.row(r, row);
+                for (i, (lanes, limit)) in row.iter_mut().zip(limits).enumerate() {
+                    let j = closed::behind(i, r, n);
+                    closed::normalise(grid, [i, j], lanes, &lengths, most);
+                    *limit = grid.limit(i, j).map(|c| c as f32);
+                }
+            },
+        );
+        let mut texels = vec![vec![[0.0; 4]; n * n]; degree + 1];
+        let mut by_row: Vec<Vec<&mut [[f32; 4]]>> = (0..n).map(|_| vec![]).collect();
+        for of in &mut texels {
+            of.chunks_exact_mut(n).zip(&mut by_row).for_each(|(row, rows)| rows.push(row));
+        }
+        by_row.into_par_iter().enumerate().for_each(|(j, mut rows)| {
+            for i in 0..n {
+                let at = if j >= i { j - i } else { j + n - i } * n + i;
+                let (Lanes([red, green, blue, density]), limit) = (&sheared[at], &limits[at]);
+                for (c, (row, weights)) in rows.iter_mut().zip(&weights).enumerate() {
+                    let mut sum = limit.map(|v| v * weights[0]);
+                    for l in 0..L {
+                        for (sum, v) in sum.iter_mut().zip([red[l], green[l], blue[l]]) {
+                            *sum += weights[l + 1] * v;
+                        }
+                    }
+                    row[i] = [sum[0], sum[1], sum[2], if c == 0 { density[0] } else { 0.0 }];
+                }
+            }
+        });
+        texels
+    }
+
     /// Premultiplied colour and opacity of a segment, as a linear filter of the texels finds them.
     pub fn look_up(&self, front: f64, back: f64, l: f64) -> [f64; 4] {
         let [f, b] = [front, back].map(|s| between((s + 1.0) / 2.0, self.size));
@@ -72,6 +139,30 @@ impl Polynomial {
         reconstructed(color, sums[0][3], l, self.direct)
     }
 
+    /// The greatest of each coefficient's channels, by which it is divided where texels are in [−1, 1]: one scale for the colours of
+    /// all powers would leave the higher ones few levels, so each has its own; with it, that of the mean extinction (which is in [0, 1]).
+    pub fn scales(&self) -> Vec<[f32; 2]> {
+        let most = |t: &Vec<[f32; 4]>| {
+            t.iter()
+                .fold([f32::MIN_POSITIVE; 2], |[c, d], t| [t[..3].iter().fold(c, |m, v| m.max(v.abs())), d.max(t[3])])
+        };
+        self.texels.iter().map(most).collect()
+    }
+
+    /// The same table as texels of `bits` bits hold it, scaled to their range: two's complement for coefficients, as they have a sign.
+    pub fn rounded(&self, bits: u32) -> Self {
+        let levels = (2f32).powi(bits as i32) - 1.0;
+        let half = ((2f32).powi(bits as i32 - 1) - 1.0).max(1.0);
+        let mut rounded = self.clone();
+        for (texels, [color, density]) in rounded.texels.iter_mut().zip(self.scales()) {
+            for t in texels {
+                t[..3].iter_mut().for_each(|v| *v = (*v / color * half).round() / half * color);
+                t[3] = (t[3] / density * levels).round() / levels * density;
+            }
+        }
+        rounded
+    }
+
     /// Bytes of its texels as 32-bit floats.
     pub fn bytes(&self) -> u64 {
         16 * u64::from(self.size).pow(2) * u64::from(self.degree + 1)
@@ -79,7 +170,7 @@ impl Polynomial {
 }
 
 /// Lagrange's polynomials, multiplied out.
-fn inverse(degree: usize) -> Inverse {
+pub(crate) fn inverse(degree: usize) -> Inverse {
     let at = |i: usize| i as f64 / degree as f64;
     let mut rows = vec![vec![]; degree + 1];
     for j in 0..=degree {

@@ -3,7 +3,7 @@
 use super::cylindrical::{coordinates, place};
 use super::*;
 use crate::field::Normal;
-use crate::transfer::{Emission, TransferFunction};
+use crate::transfer::{Convention, Emission, TransferFunction};
 
 fn exact(opacity: &[(f64, f64)], emission: Emission) -> Exact<f64> {
     let color = vec![(-1.0, [1.0, 0.2, 0.0]), (0.3, [0.0, 0.5, 0.9]), (1.0, [0.4, 0.4, 0.4])];
@@ -176,6 +176,201 @@ fn limits_are_finite() {
             assert!(got.iter().all(|c| c.is_finite()), "{front} {back} {l}: {got:?}");
         }
     }
+    // A stretch of opacity 1 is as opaque as numbers allow.
+    let color = vec![(-1.0, [1.0, 0.2, 0.0]), (1.0, [0.4, 0.4, 0.4])];
+    let opacity = vec![(-1.0, 0.0), (-0.2, 1.0), (0.2, 1.0), (0.5, 0.0), (1.0, 0.0)];
+    let opaque = TransferFunction::new(color, opacity, 1.0).unwrap().with_convention(Convention::Opacity);
+    let opaque = Exact::new(&opaque, field::Kind::Scalar, &[Normal { mid: 0.0, half: 1.0 }; 4], 1.0);
+    for (exact, longest) in [(&peak, 1.0), (&opaque, 1.0), (&opaque, 1e-6), (&opaque, 1e6), (&peak, 1e-30)] {
+        for kind in [Kind::Uniform, Kind::Log, Kind::LogNormalised] {
+            let size = [17, 17, 12];
+            let made = [Table::closed(exact, kind, size, longest), Table::incremental(exact, kind, size, longest)];
+            for table in made.iter().flatten() {
+                assert!(table.texels.as_flattened().iter().all(|v| v.is_finite() && *v >= 0.0), "{kind:?}, {longest}");
+            }
+            let want = Table::new(exact, kind, size, longest).unwrap();
+            let apart = apart_texels(&made[0].as_ref().unwrap().texels, &want.texels);
+            assert!(apart < 2e-5, "{kind:?}, {longest}: {apart}");
+        }
+        let polynomial = Polynomial::closed(exact, 4, 17, longest).unwrap();
+        assert!(polynomial.texels.iter().all(|t| t.as_flattened().iter().all(|v| v.is_finite())), "{longest}");
+    }
     assert_eq!(Polynomial::new(&peak, 0, 33, 1.0), None);
     assert_eq!(Cylindrical::new(&peak, 6, 33, 1.0), None);
+}
+
+fn functions() -> Vec<(&'static str, Exact<f64>)> {
+    let exact = |t: &TransferFunction| Exact::new(t, field::Kind::Scalar, &[Normal { mid: 0.0, half: 1.0 }; 4], 1.0);
+    transfers().iter().map(|(name, transfer)| (*name, exact(transfer))).collect()
+}
+
+/// Functions of all kinds: ramps, a peak 1 % wide, steps, 256 random entries; which one, and whether it emits directly.
+pub(crate) fn transfers() -> Vec<(&'static str, TransferFunction)> {
+    let mut seed = 77u64;
+    let mut unit = move || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 11) as f64 / (1u64 << 53) as f64
+    };
+    let mut all = vec![];
+    for emission in [Emission::Chromatic, Emission::Direct { scale: 0.7 }] {
+        for kind in ["ramps", "peak", "steps", "entries"] {
+            let (mut opacity, mut color) = (vec![], vec![]);
+            let mut add = |s: f64, a: f64, c: [f64; 3]| {
+                opacity.push((s, a));
+                color.push((s, c));
+            };
+            match kind {
+                "ramps" => (0..6).for_each(|i| add(-1.0 + 0.4 * f64::from(i), 3.0 * unit(), [unit(), unit(), unit()])),
+                "peak" => [(-1.0, 0.0), (0.123, 0.0), (0.133, 60.0), (0.143, 0.0), (1.0, 0.0)]
+                    .into_iter()
+                    .for_each(|(s, a)| add(s, a, [unit(), unit(), unit()])),
+                "steps" => {
+                    for i in 0..5 {
+                        let (a, c) = (4.0 * unit(), [unit(), unit(), unit()]);
+                        add(-1.0 + 0.4 * f64::from(i), a, c);
+                        add(-1.0 + 0.4 * f64::from(i + 1), a, c);
+                    }
+                }
+                _ => (0..256)
+                    .for_each(|i| add(-1.0 + 2.0 * f64::from(i) / 255.0, 3.0 * unit(), [unit(), unit(), unit()])),
+            }
+            let transfer = TransferFunction::new(color, opacity, 1.0).unwrap().with_emission(emission).unwrap();
+            all.push((kind, transfer));
+        }
+    }
+    all
+}
+
+/// The greatest difference of two lists of texels, relative to the greatest of the channel.
+pub(crate) fn apart_texels(got: &[[f32; 4]], want: &[[f32; 4]]) -> f32 {
+    assert_eq!(got.len(), want.len());
+    let most = want.iter().fold([1e-30f32; 4], |m, t| std::array::from_fn(|k| m[k].max(t[k].abs())));
+    let all = got.iter().zip(want).flat_map(|(g, w)| (0..4).map(move |k| (g[k] - w[k]).abs() / most[k]));
+    all.fold(0.0, |m, e| if e > m || e.is_nan() { e } else { m })
+}
+
+#[test]
+fn closed_form_agrees_with_f64() {
+    for (name, exact) in functions() {
+        let direct = exact.direct;
+        for kind in [Kind::Uniform, Kind::Log, Kind::LogNormalised] {
+            for (n, slices, longest) in [(33, 9, 2.0), (24, 17, 40.0)] {
+                let [got, want] =
+                    [Table::closed, Table::new].map(|make| make(&exact, kind, [n, n, slices], longest).unwrap());
+                let apart = apart_texels(&got.texels, &want.texels);
+                assert!(apart < 1e-5, "{name}, direct {direct}, {kind:?}, {n}: {apart}");
+            }
+        }
+        for degree in [1, 2, 4] {
+            let [got, want] = [Polynomial::closed, Polynomial::new].map(|make| make(&exact, degree, 30, 3.0).unwrap());
+            // Of high degrees, coefficients are great sums of both signs: what counts is the sum.
+            for [front, back, l] in segments().take(4000) {
+                let [got, want] = [&got, &want].map(|t| t.look_up(front, back, 3.0 * l));
+                let apart = (0..4).fold(0.0, |m: f64, k| m.max((got[k] - want[k]).abs()));
+                assert!(apart < 4e-5, "{name}, direct {direct}, degree {degree}: {got:?}, not {want:?}");
+            }
+        }
+    }
+}
+
+/// Numeric integration as published, and slices made of slices: near what they stand for, the nearer the finer.
+#[test]
+fn published_constructions_come_near() {
+    for (name, exact) in functions() {
+        for kind in [Kind::Uniform, Kind::Log] {
+            let apart_from = |table: &Table, want: &Table| {
+                let all = table.texels.iter().zip(&want.texels).flat_map(|(g, w)| (0..4).map(move |k| g[k] - w[k]));
+                let sum: f64 = all.map(|d| f64::from(d).powi(2)).sum();
+                assert!(sum.is_finite(), "{name} {kind:?}");
+                (sum / (4 * want.texels.len()) as f64).sqrt()
+            };
+            let mut last = [f64::INFINITY; 3];
+            for (n, m) in [(32, 256), (64, 1024)] {
+                let size = [n, n, 17];
+                let want = Table::closed(&exact, kind, size, 2.0).unwrap();
+                let made = [
+                    Table::sampled(&exact, kind, size, 2.0, Sampling::same(m, 1.0)).unwrap(),
+                    Table::sampled(&exact, kind, size, 2.0, Sampling::touched(m, 2.0)).unwrap(),
+                    Table::incremental(&exact, kind, size, 2.0).unwrap(),
+                ];
+                let now = [0, 1, 2].map(|k| apart_from(&made[k], &want));
+                for k in 0..3 {
+                    assert!(
+                        now[k] < 0.2 && now[k] < ([0.9, 0.9, 1.0][k] * last[k]).max(1e-5),
+                        "{name} {kind:?} {n} {k}: {now:?} after {last:?}"
+                    );
+                }
+                last = now;
+            }
+        }
+    }
+}
+
+#[test]
+fn cylinders_in_closed_form_agree_with_f64() {
+    for (name, exact) in functions() {
+        let [got, want] = [Cylindrical::closed, Cylindrical::new].map(|make| make(&exact, 16, 24, 3.0).unwrap());
+        let apart = apart_texels(&got.texels, &want.texels);
+        assert!(apart < 1e-6, "{name}, direct {}: {apart}", exact.direct);
+    }
+}
+
+/// What few bits cost, and what the opacity that is linear in length costs.
+#[test]
+fn cheaper_texels_cost_what_they_should() {
+    let (_, exact) = functions().swap_remove(0);
+    let whole = Polynomial::closed(&exact, 2, 64, 2.0).unwrap();
+    let [of_whole, _] = errors(&exact, 2.0, |f, b, l| whole.look_up(f, b, l));
+    let apart = [8, 16].map(|bits| {
+        let rounded = whole.rounded(bits);
+        let mut sum = 0.0;
+        for [f, b, l] in segments() {
+            let (got, want) = (rounded.look_up(f, b, 2.0 * l), whole.look_up(f, b, 2.0 * l));
+            sum += (0..4).map(|k| (got[k] - want[k]).powi(2)).sum::<f64>() / 80_000.0;
+        }
+        sum.sqrt()
+    });
+    assert!(apart[0] < 4e-3 && apart[0] > 100.0 * apart[1] && apart[1] < 2e-5, "{apart:?}");
+    let linear = Linear::closed(&exact, 64, 2.0).unwrap();
+    let [of_linear, _] = errors(&exact, 2.0, |f, b, l| linear.look_up(f, b, l));
+    assert!(of_linear > 10.0 * of_whole, "{of_linear} {of_whole}");
+    let [a, b] = [Linear::closed, Linear::new].map(|make| make(&exact, 40, 2.0).unwrap());
+    assert!(apart_texels(&a.texels, &b.texels) < 1e-5);
+    let bits = |bits| Sampling { bits: Some(bits), ..Sampling::same(128, 1.0) };
+    let fine = Table::closed(&exact, Kind::Uniform, [32, 32, 9], 2.0).unwrap();
+    let rms = [8, 12].map(|b| {
+        let table = Table::sampled(&exact, Kind::Uniform, [32, 32, 9], 2.0, bits(b)).unwrap();
+        table
+            .texels
+            .iter()
+            .zip(&fine.texels)
+            .map(|(g, w)| (0..4).map(|k| (g[k] - w[k]).powi(2)).sum::<f32>())
+            .sum::<f32>()
+    });
+    assert!(rms[0] > 20.0 * rms[1], "{rms:?}");
+}
+
+/// The greatest error that is seen is within the bound, and the bound is not idle: near the diagonal and anywhere.
+#[test]
+fn errors_are_within_their_bounds() {
+    for (name, exact) in functions().into_iter().filter(|(_, e)| !e.direct) {
+        for (n, slices, longest) in [(32, 17, 2.0), (64, 33, 2.0), (128, 65, 2.0), (64, 17, 0.05), (200, 9, 0.05)] {
+            let table = Table::closed(&exact, Kind::Uniform, [n, n, slices], longest).unwrap();
+            let bound = table.bound(&exact).unwrap();
+            let mut most = 0.0f64;
+            for (i, [front, back, l]) in segments().enumerate() {
+                // Half of them within two texels of the diagonal, where functions are seen as they are.
+                let back = if i % 2 == 0 { back } else { (front + 4.0 * back / f64::from(n)).clamp(-1.0, 1.0) };
+                let (got, want) =
+                    (table.look_up(front, back, longest * l), published(&exact, front, back, longest * l));
+                most = (0..4).fold(most, |m, k| m.max((got[k] - want[k]).abs()));
+            }
+            println!("{name}, {n}, {longest}: {most:.2e} of {bound:.2e}");
+            assert!(most <= bound && most >= 0.05 * bound, "{name}, {n}, {longest}: {most} of {bound}");
+        }
+    }
+    let (_, ramps) = functions().swap_remove(0);
+    let [n, _, slices] = size(&ramps, 2.0, 0.2).unwrap();
+    assert!(bound(&ramps, n, slices, 2.0).unwrap() <= 0.2, "{n} {slices}");
+    assert!(bound(&ramps, n / 2, slices, 2.0).unwrap() > 0.1, "{n} {slices}");
 }

@@ -7,6 +7,8 @@
 //! are. What hardly depends on the length has no such bias: [`Kind::LogNormalised`] keeps the mean extinction ρ̂ = −ln(1−α)/l
 //! and the colour C/α, so that α = 1 − e^{−l ρ̂}.
 
+use super::closed::{self, Lanes, Rows};
+use super::grid::Grid;
 use super::{between, is_scalar, light, published, reconstructed, value};
 use crate::integral::{Exact, Light};
 use rayon::prelude::*;
@@ -41,8 +43,12 @@ pub struct Table {
     pub texels: Vec<[f32; 4]>,
 }
 
+/// Lengths that are integrated side by side, and rows of the sheared table that are written at a time.
+const LANES: usize = 8;
+const ROWS: usize = 8;
+
 /// Optical depths beyond this are opaque, and so is a mean extinction that gives it to the thinnest slice but 0.
-const OPAQUE_DEPTH: f64 = 100.0;
+pub(crate) const OPAQUE_DEPTH: f64 = 100.0;
 
 /// The piecewise linear function along one segment: extinction and colour in front and behind of each piece, and its share of
 /// the length.
@@ -72,6 +78,68 @@ impl Table {
             .collect();
         let texels = (0..lengths.len()).flat_map(|k| columns.iter().map(move |c| c[k])).collect();
         Some(Table { kind, size, longest, direct: exact.direct, texels })
+    }
+
+    /// The same table, to f32, in a time per texel that does not depend on the function (`closed.rs` says how), where there are as
+    /// many values behind as in front; other sizes as [`Table::new`] has them.
+    pub fn closed(exact: &Exact<f64>, kind: Kind, size: [u32; 3], longest: f64) -> Option<Self> {
+        if size[0] != size[1] || size[0] < 3 {
+            return Self::new(exact, kind, size, longest);
+        }
+        if !is_scalar(exact) || size[2] < 3 {
+            return None;
+        }
+        let texels = vec![[0.0; 4]; size.iter().map(|&n| n as usize).product()];
+        let mut table = Table { kind, size, longest, direct: exact.direct, texels };
+        table.fill(&Grid::new(exact, size[0]));
+        Some(table)
+    }
+
+    /// This table of another function, in the memory that it has: faster than [`Table::closed`], as that is then known to be there.
+    pub fn rebuild(&mut self, exact: &Exact<f64>) {
+        let [w, h, _] = self.size;
+        if is_scalar(exact) && w == h && w > 2 {
+            self.direct = exact.direct;
+            self.fill(&Grid::new(exact, w));
+        } else if let Some(new) = Self::new(exact, self.kind, self.size, self.longest) {
+            *self = new;
+        }
+    }
+
+    fn fill(&mut self, grid: &Grid) {
+        let (n, slices, normalised) = (grid.size, self.size[2], self.kind == Kind::LogNormalised);
+        let length = |k: u32| length(self.kind, slices, self.longest, k.min(slices - 1));
+        let most = (OPAQUE_DEPTH / length(1)) as f32;
+        let fill = |(group, texels): (usize, &mut [[f32; 4]])| {
+            let lengths: [f32; LANES] = std::array::from_fn(|l| length((group * LANES + l) as u32) as f32);
+            let mut rows = Rows::new(grid, lengths);
+            let mut sheared = vec![Lanes::NOTHING; ROWS * n];
+            let mut slices: Vec<_> = texels.chunks_exact_mut(n * n).collect();
+            for first in (0..n).step_by(ROWS) {
+                let count = ROWS.min(n - first);
+                for (r, row) in (first..first + count).zip(sheared.chunks_exact_mut(n)) {
+                    rows.row(r, row);
+                    if normalised {
+                        for (i, lanes) in row.iter_mut().enumerate() {
+                            closed::normalise(grid, [i, closed::behind(i, r, n)], lanes, &lengths, most);
+                        }
+                    } else {
+                        closed::publish(row);
+                    }
+                }
+                // Several rows at a time, as then texels that are written one after another are neighbours.
+                for j in 0..n {
+                    for r in 0..count {
+                        let i = if j >= first + r { j - first - r } else { j + n - first - r };
+                        let Lanes([red, green, blue, last]) = &sheared[r * n + i];
+                        for (l, slice) in slices.iter_mut().enumerate() {
+                            slice[j * n + i] = [red[l], green[l], blue[l], last[l]];
+                        }
+                    }
+                }
+            }
+        };
+        self.texels.par_chunks_mut(n * n * LANES).enumerate().for_each(fill);
     }
 
     /// Premultiplied colour and opacity of a segment, as a linear filter of the texels finds them.

@@ -112,12 +112,10 @@ fn the_device_sorts_as_the_host_does() {
     }
 }
 
-#[test]
-fn pictures_do_not_depend_on_who_sorts() {
-    let Some(gpu) = gpu() else { return };
-    let choice = DeviceChoice::Named(gpu.adapter.index.to_string());
-    let mut renderer = Renderer::with_engine(2, choice, Engine::Project).unwrap();
-    let mesh = generate::tetrahedra(8);
+/// A renderer with a mesh of `n` × `n` × `n` cubes, and a view of it.
+fn prepared(engine: Engine, choice: DeviceChoice, n: usize, size: [u32; 2]) -> (Renderer, View) {
+    let mut renderer = Renderer::with_engine(2, choice, engine).unwrap();
+    let mesh = generate::tetrahedra(n);
     renderer.set_mesh(&mesh, Tetrahedra::new(&mesh).unwrap());
     let field = Field::new(&mesh, "s", Some(Association::Point), Component::Index(0)).unwrap();
     renderer.set_field(&field).unwrap();
@@ -126,7 +124,18 @@ fn pictures_do_not_depend_on_who_sorts() {
     renderer.set_transfer(&TransferFunction::new(color, vec![(0.0, 0.0), (high, 4.0)], 1.0).unwrap());
     let projection = Projection::Perspective { view_angle: 50.0 };
     let camera = Camera { position: dvec3(1.0, 2.0, 3.0), focal_point: DVec3::ZERO, view_up: DVec3::Y, projection };
-    let view = View::new(camera, [48, 40]).unwrap();
+    (renderer, View::new(camera, size).unwrap())
+}
+
+/// The device that tests draw on.
+fn chosen(gpu: &Gpu) -> DeviceChoice {
+    DeviceChoice::Named(gpu.adapter.index.to_string())
+}
+
+#[test]
+fn pictures_do_not_depend_on_who_sorts() {
+    let Some(gpu) = gpu() else { return };
+    let (mut renderer, view) = prepared(Engine::Project, chosen(&gpu), 8, [48, 40]);
     let [host, device] = [false, true].map(|on_device| {
         renderer.project().unwrap().sort_on_device(on_device);
         renderer.render(&view, &|_| ()).unwrap()
@@ -134,5 +143,40 @@ fn pictures_do_not_depend_on_who_sorts() {
     assert!(host.pixels.iter().any(|p| p[3] > 0.5));
     assert!(host == device);
     let drawn = renderer.stats().projection.unwrap().drawn_cells;
-    assert!(drawn > 0 && drawn < mesh.cells().len() as u64, "{drawn} cells drawn, some are empty");
+    assert!(drawn > 0 && drawn < 6 * 8 * 8 * 8, "{drawn} cells drawn, some are empty");
+}
+
+#[test]
+fn a_lost_device_is_survived() {
+    let Some(gpu) = gpu() else { return };
+    let (mut renderer, view) = prepared(Engine::Project, chosen(&gpu), 4, [24, 24]);
+    let before = renderer.render(&view, &|_| ()).unwrap();
+    for _ in 0..3 {
+        renderer.project().unwrap().gpu().device.destroy();
+        assert!(renderer.render(&view, &|_| ()).unwrap() == before);
+        assert_eq!(renderer.stats().device, "gpu");
+    }
+}
+
+/// More cells than one binding holds, and more entries than one buffer of the order.
+#[test]
+fn ten_million_tetrahedra_are_drawn() {
+    let Some(gpu) = gpu() else { return };
+    if std::env::var_os("HALITE_LONG").is_none() {
+        eprintln!("not run: HALITE_LONG is not set");
+        return;
+    }
+    let [(mut project, view), (mut traverse, _)] =
+        [(Engine::Project, chosen(&gpu)), (Engine::Traverse, DeviceChoice::Cpu)]
+            .map(|(engine, choice)| prepared(engine, choice, 119, [256, 256]));
+    let everything = TransferFunction::new(vec![(-1.0, [1.0, 0.5, 0.0])], vec![(-1.0, 0.5), (1.0, 2.0)], 1.0).unwrap();
+    project.set_transfer(&everything);
+    traverse.set_transfer(&everything);
+    let (got, want) = (project.render(&view, &|_| ()).unwrap(), traverse.render(&view, &|_| ()).unwrap());
+    let bindings: usize = project.project().unwrap().arrays().unwrap().iter().map(|a| a.chunks).sum();
+    let drawn = project.stats().projection.unwrap().drawn_cells;
+    let error = got.compare(&want).unwrap();
+    eprintln!("{bindings} bindings, {drawn} cells, error {:e}, {:?}", error.max, project.stats());
+    assert!(bindings > 3 && drawn > ORDER_CHUNK as u64);
+    assert!(error.max < 1e-3);
 }

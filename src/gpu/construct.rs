@@ -1,0 +1,333 @@
+//! Pre-integrated tables, built on a device: the same texels as `integral::table` has, in `shaders/construct.wgsl`.
+
+use super::buffers::Buffer;
+use super::raster::{self, Readback, Slot};
+use super::shader::{self, Variant};
+use super::{DeviceChoice, Gpu, function};
+use crate::error::Result;
+use crate::field::{self, Normal};
+use crate::integral::table::{Cylindrical, Kind, Nodes, OPAQUE_DEPTH, Polynomial, Sampling, Steps, Table, length};
+use crate::integral::{Exact, table};
+use crate::transfer::TransferFunction;
+use bytemuck::{Pod, Zeroable};
+use std::time::Instant;
+use wgpu::{BufferUsages as Usage, ShaderStages as Stages};
+
+const CONSTRUCT: &str = include_str!("../../shaders/construct.wgsl");
+
+/// Slices that one job knows the lengths of.
+const MOST_SLICES: usize = 256;
+
+/// How the texels of a volume are found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Construction {
+    /// In closed form, per interval of the function.
+    Closed,
+    /// By numeric integration.
+    Sampled(Sampling),
+    /// Each slice from the one before.
+    Incremental,
+}
+
+/// `Job` in the shader.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Job {
+    size: u32,
+    slices: u32,
+    first: u32,
+    normalised: u32,
+    entries: u32,
+    samples: u32,
+    oversampling: f32,
+    most: f32,
+    longest: f32,
+    degree: u32,
+    count: u32,
+    unused: u32,
+    lengths: [f32; MOST_SLICES],
+    weights: [[f32; 8]; 5],
+}
+
+impl Job {
+    fn from(mut self, first: u32) -> Self {
+        self.first = first;
+        self
+    }
+}
+
+/// A device that builds tables of one function.
+pub struct Constructor {
+    gpu: Gpu,
+    layouts: [wgpu::BindGroupLayout; 2],
+    pipelines: [wgpu::ComputePipeline; 6],
+    function: [Buffer; 3],
+    exact: Exact<f64>,
+}
+
+/// Entry points, in the order of the pipelines.
+const ENTRIES: [&str; 6] = ["closed", "coefficients", "sampled", "doubled", "longer", "cylinder"];
+const CLOSED: usize = 0;
+const COEFFICIENTS: usize = 1;
+const SAMPLED: usize = 2;
+const DOUBLED: usize = 3;
+const LONGER: usize = 4;
+const CYLINDER: usize = 5;
+
+/// One dispatch: which pipeline, with what, and how many groups.
+type Dispatch = (usize, Job, [u32; 3]);
+
+impl Constructor {
+    /// Opens what `choice` says, for tables of `transfer` over a field of one component that `normal` maps, on a mesh whose coordinates
+    /// were multiplied by `scale`. None if `choice` is the CPU, or there is no GPU and none was named.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] if no adapter bears the name, it is of no use, or it cannot be opened.
+    pub fn open(
+        choice: &DeviceChoice,
+        transfer: &TransferFunction,
+        normal: &[Normal; 4],
+        scale: f64,
+    ) -> Result<Option<Self>> {
+        use Slot::{Read, Uniform, Write};
+        let Some(gpu) = Gpu::open(choice)? else { return Ok(None) };
+        let exact = Exact::<f64>::new(transfer, field::Kind::Scalar, normal, scale);
+        let variant = Variant { kind: field::Kind::Scalar, direct: exact.direct };
+        let source = [&shader::prelude(&variant), shader::INTEGRAL, CONSTRUCT].concat();
+        let module = raster::module(&gpu, "construct", &source);
+        let layouts = [
+            raster::layout(&gpu, Stages::COMPUTE, &[Uniform, Read, Read]),
+            raster::layout(&gpu, Stages::COMPUTE, &[Uniform, Read, Read, Read, Read, Write, Write]),
+        ];
+        let layout = raster::pipeline_layout(&gpu, &layouts.each_ref().map(Some));
+        let pipelines = ENTRIES.map(|entry| raster::compute(&gpu, &module, entry, &layout));
+        gpu.check()?;
+        let function = function::upload(&gpu, &Exact::<f32>::new(transfer, field::Kind::Scalar, normal, scale))?;
+        Ok(Some(Constructor { gpu, layouts, pipelines, function, exact }))
+    }
+
+    /// The device's name.
+    pub fn name(&self) -> &str {
+        &self.gpu.adapter.name
+    }
+
+    /// A table of three parameters, and the milliseconds that the device took, without the way back. `None` as [`Table::new`], unless
+    /// there are as many values behind as in front, and for what a construction does not know.
+    ///
+    /// # Errors
+    /// [`crate::Error::Memory`] if the device has no room, and those of a device that fails.
+    pub fn volume(
+        &self,
+        kind: Kind,
+        size: [u32; 3],
+        longest: f64,
+        construction: Construction,
+    ) -> Result<Option<(Table, f64)>> {
+        let [n, h, slices] = size;
+        let normalised = kind == Kind::LogNormalised;
+        if n != h || n < 3 || slices < 3 || slices as usize > MOST_SLICES {
+            return Ok(None);
+        }
+        let mut job = self.job(n, slices, longest, (0..slices).map(|k| length(kind, slices, longest, k)));
+        job.normalised = u32::from(normalised);
+        let groups = [n.div_ceil(64), n, slices];
+        let closed = |job: Job, first: u32, count: u32| (CLOSED, job.from(first), [n.div_ceil(64), count, 1]);
+        let mut list = vec![];
+        let dispatches: Vec<Dispatch> = match construction {
+            Construction::Closed => vec![closed(job, 0, slices)],
+            _ if normalised => return Ok(None),
+            Construction::Incremental => {
+                let next = if kind == Kind::Uniform { LONGER } else { DOUBLED };
+                let of = [n.div_ceil(64), n, 1];
+                let steps = (2..slices).map(move |first| -> Dispatch { (next, job.from(first), of) });
+                std::iter::once(closed(job, 0, 2)).chain(steps).collect()
+            }
+            Construction::Sampled(Sampling { bits: Some(_), .. }) => return Ok(None),
+            Construction::Sampled(sampling) if sampling.entries < 2 => return Ok(None),
+            Construction::Sampled(sampling) => {
+                list = table::entries(&self.exact, sampling.entries);
+                let (samples, oversampling) = match sampling.steps {
+                    Steps::Same(samples) => (samples.max(1), 0.0),
+                    Steps::Touched(o) => (0, o as f32),
+                };
+                (job.entries, job.samples, job.oversampling) = (sampling.entries, samples, oversampling);
+                vec![(SAMPLED, job, groups)]
+            }
+        };
+        let count = n as usize * n as usize * slices as usize;
+        let Some((texels, ms)) = self.run(n, &list, &dispatches, [count, 0])? else { return Ok(None) };
+        Ok(Some((Table { kind, size, longest, direct: self.exact.direct, texels }, ms)))
+    }
+
+    /// Polynomials in closed form, and the milliseconds that the device took. `None` as [`Polynomial::new`], and for degrees beyond 4.
+    ///
+    /// # Errors
+    /// As [`Self::volume`].
+    pub fn polynomial(&self, degree: u32, size: u32, longest: f64) -> Result<Option<(Polynomial, f64)>> {
+        if size < 3 || !(1..=4).contains(&degree) {
+            return Ok(None);
+        }
+        let lengths = (1..=degree).map(|i| longest * f64::from(i) / f64::from(degree));
+        let mut job = self.job(size, degree, longest, lengths);
+        (job.degree, job.normalised) = (degree, 1);
+        for (row, of) in job.weights.iter_mut().zip(table::inverse(degree as usize)) {
+            row.iter_mut().zip(of).for_each(|(w, of)| *w = of as f32);
+        }
+        let slice = size as usize * size as usize;
+        let dispatches =
+            [(CLOSED, job, [size.div_ceil(64), degree, 1]), (COEFFICIENTS, job, [size.div_ceil(64), size, 1])];
+        let counts = [slice * degree as usize, slice * (degree as usize + 1)];
+        let Some((texels, ms)) = self.run(size, &[], &dispatches, counts)? else { return Ok(None) };
+        let texels = texels.chunks_exact(slice).map(<[_]>::to_vec).collect();
+        Ok(Some((Polynomial { degree, size, longest, direct: self.exact.direct, texels }, ms)))
+    }
+
+    /// A table in cylinder coordinates, in closed form, and the milliseconds that the device took. `None` as [`Cylindrical::new`].
+    ///
+    /// # Errors
+    /// As [`Self::volume`].
+    pub fn cylindrical(&self, planes: u32, size: u32, longest: f64) -> Result<Option<(Cylindrical, f64)>> {
+        if planes == 0 || !planes.is_multiple_of(4) || planes > 65_535 || size < 3 {
+            return Ok(None);
+        }
+        let job = self.job(size, planes, longest, std::iter::empty());
+        let count = planes as usize * size as usize * size as usize;
+        let dispatch = (CYLINDER, job, [size.div_ceil(64), planes, 1]);
+        let Some((texels, ms)) = self.run(size, &[], &[dispatch], [count, 0])? else { return Ok(None) };
+        Ok(Some((Cylindrical { planes, size, longest, texels }, ms)))
+    }
+
+    fn job(&self, size: u32, slices: u32, longest: f64, lengths: impl Iterator<Item = f64>) -> Job {
+        let mut job = Job { size, slices, longest: longest as f32, ..Job::zeroed() };
+        job.lengths.iter_mut().zip(lengths).for_each(|(to, l)| *to = l as f32);
+        let thinnest = if job.lengths[0] > 0.0 { job.lengths[0] } else { job.lengths[1] };
+        job.most = (OPAQUE_DEPTH / f64::from(thinnest)) as f32;
+        job
+    }
+
+    /// Does `dispatches`, one after another, with room for so many texels and results; the results, or else the texels, and the time.
+    /// None if a binding has no room for them.
+    fn run(
+        &self,
+        size: u32,
+        list: &[[f32; 4]],
+        dispatches: &[Dispatch],
+        counts: [usize; 2],
+    ) -> Result<Option<(Vec<[f32; 4]>, f64)>> {
+        let gpu = &self.gpu;
+        let limits = gpu.device.limits();
+        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let bytes = counts.map(|c| 16 * c as u64);
+        if bytes.iter().any(|&b| b > most) {
+            return Ok(None);
+        }
+        let start = Instant::now();
+        let Nodes { parts, begin, nodes } = Nodes::new(&self.exact, size);
+        let uploaded = [
+            Buffer::holding(gpu, "parts", &parts, Usage::STORAGE)?,
+            Buffer::holding(gpu, "begin", &begin, Usage::STORAGE)?,
+            Buffer::holding(gpu, "nodes", &nodes, Usage::STORAGE)?,
+            Buffer::holding(gpu, "list", list, Usage::STORAGE)?,
+        ];
+        let [texels, result] = ["texels", "result"].map(|label| {
+            let of = usize::from(label == "result");
+            Buffer::new(gpu, label, bytes[of], Usage::STORAGE | Usage::COPY_SRC)
+        });
+        let (texels, result) = (texels?, result?);
+        let shared = raster::group(gpu, &self.layouts[0], self.function.iter().map(|b| b.raw.as_entire_binding()));
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let mut jobs = vec![];
+        for (pipeline, job, [x, y, z]) in dispatches {
+            let job = Buffer::holding(gpu, "job", std::slice::from_ref(job), Usage::UNIFORM)?;
+            let all = std::iter::once(&job).chain(&uploaded).chain([&texels, &result]);
+            let group = raster::group(gpu, &self.layouts[1], all.map(|b| b.raw.as_entire_binding()));
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            pass.set_pipeline(&self.pipelines[*pipeline]);
+            pass.set_bind_group(0, &shared, &[]);
+            pass.set_bind_group(1, &group, &[]);
+            pass.dispatch_workgroups(*x, *y, *z);
+            drop(pass);
+            jobs.push(job);
+        }
+        gpu.queue.submit([encoder.finish()]);
+        gpu.wait()?;
+        let ms = start.elapsed().as_secs_f64() * 1e3;
+        let (from, bytes) = if bytes[1] > 0 { (&result, bytes[1]) } else { (&texels, bytes[0]) };
+        let back = Readback::new(gpu, bytes)?;
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        encoder.copy_buffer_to_buffer(&from.raw, 0, back.raw(), 0, bytes);
+        let texels = back.submit(gpu, encoder, |bytes| bytemuck::cast_slice::<u8, [f32; 4]>(bytes).to_vec())?;
+        Ok(Some((texels, ms)))
+    }
+}
+
+impl std::fmt::Debug for Constructor {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Constructor").field("device", &self.gpu.adapter.name).finish_non_exhaustive()
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "tests")]
+mod tests {
+    use super::*;
+    use crate::gpu::testing;
+    use crate::integral::table::tests::{apart_texels, transfers};
+
+    const NORMAL: [Normal; 4] = [Normal { mid: 0.0, half: 1.0 }; 4];
+
+    #[test]
+    fn shaders_are_valid() {
+        for direct in [false, true] {
+            let variant = Variant { kind: field::Kind::Scalar, direct };
+            testing::validated(&[&shader::prelude(&variant), shader::INTEGRAL, CONSTRUCT].concat());
+        }
+        assert_eq!(size_of::<Job>(), 48 + 16 * 64 + 16 * 10);
+    }
+
+    /// What the device builds is what the CPU builds: in closed form the exact integral, else the same approximation.
+    #[test]
+    fn tables_are_those_of_the_cpu() {
+        let Some(choice) = testing::choice() else { return };
+        for (name, transfer) in transfers() {
+            let device = Constructor::open(&choice, &transfer, &NORMAL, 1.0).unwrap().unwrap();
+            let exact = &device.exact;
+            let near = |got: &[[f32; 4]], want: &[[f32; 4]], most: f32, what: &str| {
+                let apart = apart_texels(got, want);
+                assert!(apart < most, "{name}, direct {}, {what}: {apart}", exact.direct);
+            };
+            for kind in [Kind::Uniform, Kind::Log, Kind::LogNormalised] {
+                let size = [40, 40, 12];
+                let (got, ms) = device.volume(kind, size, 2.0, Construction::Closed).unwrap().unwrap();
+                near(&got.texels, &Table::new(exact, kind, size, 2.0).unwrap().texels, 1e-5, "closed");
+                assert!(ms > 0.0);
+                let sampling = [Sampling::same(64, 1.0), Sampling::touched(100, 2.0)];
+                for how in sampling.map(Construction::Sampled).into_iter().chain([Construction::Incremental]) {
+                    let got = device.volume(kind, size, 2.0, how).unwrap();
+                    let want = match how {
+                        Construction::Sampled(sampling) => Table::sampled(exact, kind, size, 2.0, sampling),
+                        _ => Table::incremental(exact, kind, size, 2.0),
+                    };
+                    assert_eq!(got.is_some(), want.is_some(), "{how:?}, {kind:?}");
+                    if let (Some((got, _)), Some(want)) = (got, want) {
+                        near(&got.texels, &want.texels, 1e-4, &format!("{how:?}, {kind:?}"));
+                    }
+                }
+            }
+            for degree in [1, 2, 4] {
+                let (got, _) = device.polynomial(degree, 33, 3.0).unwrap().unwrap();
+                let want = Polynomial::new(exact, degree, 33, 3.0).unwrap();
+                near(&got.texels[0], &want.texels[0], 1e-5, "limit and extinction");
+                for i in 0..400u32 {
+                    let [f, b, l] = [0.8191, 0.6710, 0.5497].map(|s| (0.5 + s * f64::from(i)).fract());
+                    let (f, b, l) = (2.0 * f - 1.0, 2.0 * b - 1.0, 3.0 * l);
+                    let (got, want) = (got.look_up(f, b, l), want.look_up(f, b, l));
+                    assert!((0..4).all(|k| (got[k] - want[k]).abs() < 1e-4), "{name}, {degree}: {got:?}, not {want:?}");
+                }
+            }
+            let (got, _) = device.cylindrical(16, 24, 3.0).unwrap().unwrap();
+            near(&got.texels, &Cylindrical::new(exact, 16, 24, 3.0).unwrap().texels, 2e-5, "cylinder");
+            assert!(device.cylindrical(6, 24, 3.0).unwrap().is_none());
+        }
+    }
+}
