@@ -315,7 +315,8 @@ fn variants_of_the_projection_engine() {
     let place = Place::new();
     place.misused("render cube.vtu --out a.png --engine project --fragments round", "round");
     place.misused("render cube.vtu --out a.png --integral volume --table 4", "--table");
-    let Ran(code, out, err) = place.run("study cube.vtu --table 32x32x8 --out sheet.png --json study.json --frames 1 --size 24x16");
+    let Ran(code, out, err) =
+        place.run("study cube.vtu --table 32x32x8 --out sheet.png --json study.json --frames 1 --size 24x16");
     if code == Some(1) && err.contains("graphics device") && std::env::var_os("HALITE_REQUIRE_GPU").is_none() {
         return;
     }

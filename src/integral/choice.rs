@@ -139,7 +139,8 @@ impl Choice {
         Choice { form, ..self }
     }
 
-    /// Texels along each axis, for a function of so many knots; the last is that of lengths, coefficients or planes.
+    /// Texels along each axis, for a function of so many knots; the last is that of lengths, coefficients or planes. Volumes of
+    /// uniform lengths may be given others, by the bound on their error: [`super::table::size`].
     pub fn size(&self, knots: usize) -> [u32; 3] {
         let values = |low: u32, high: u32| (2 * knots as u32).next_power_of_two().clamp(low, high);
         match (self.form, self.table) {

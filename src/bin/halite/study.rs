@@ -114,7 +114,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
         return forms::run(options, threads);
     }
     let given = options.request.scene()?;
-    let table = options.request.choice(given.as_ref())?.table.or(Some([256, 256, 16]));
+    let size = options.request.choice(given.as_ref())?.table.or(Some([256, 256, 16]));
     let device = options.request.device(given.as_ref());
     let mut judge = Renderer::with_device(threads, DeviceChoice::Cpu)?;
     let job = judge.install(|| render::prepare(&options.request, given))?;
@@ -125,7 +125,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
         judge.render(&view, p)
     })?;
     set(&mut renderer, &job)?;
-    let all = variants(table);
+    let all = variants(size);
     let (count, mut rows) = (all.len() as f64, Vec::new());
     progress::during("drawing", |p| {
         for (i, variant) in all.into_iter().enumerate() {
