@@ -1,10 +1,10 @@
 // The ray-segment integral: the f32 twin of src/integral.rs, which explains it.
 
-/// A knot of the transfer function: extinction and colour from it on, and how they rise up to the next knot.
+/// A knot of the transfer function: extinction and colour from it on, how they rise up to the next knot, and where both are.
 struct Knot {
     value: vec4f,
     slope: vec4f,
-    s: f32,
+    ends: vec2f,
 }
 
 /// Where the knots of the functions are, and how colours are scaled.
@@ -110,7 +110,7 @@ fn track(first: u32, last: u32, bucket: u32, front: f32, back: f32) -> Track {
     work += 4u;
     while above > i + 1u {
         let middle = (i + above) / 2u;
-        if knots[middle].s <= front {
+        if knots[middle].ends.x <= front {
             i = middle;
         } else {
             above = middle;
@@ -118,16 +118,16 @@ fn track(first: u32, last: u32, bucket: u32, front: f32, back: f32) -> Track {
         work++;
     }
     // Where rounding chose the bucket beside.
-    while i > first && knots[i].s > front {
+    while i > first && knots[i].ends.x > front {
         i--;
     }
-    while i + 2u < last && knots[i + 1u].s <= front {
+    while i + 2u < last && knots[i].ends.y <= front {
         i++;
     }
     let rise = back - front;
     if rise == 0.0 {
         // A constant that is opaque as a single value is opaque all along.
-        while i > first && knots[i - 1u].s == front && knots[i - 1u].value.x >= OPAQUE && knots[i].value.x < OPAQUE {
+        while i > first && knots[i - 1u].ends.x == front && knots[i - 1u].value.x >= OPAQUE && knots[i].value.x < OPAQUE {
             i--;
         }
     }
@@ -139,13 +139,14 @@ fn end_of(t: Track) -> f32 {
     if t.rise == 0.0 {
         return 2.0;
     }
-    return (knots[select(t.i, t.i + 1u, t.rise > 0.0)].s - t.front) / t.rise;
+    let ends = knots[t.i].ends;
+    return (select(ends.x, ends.y, t.rise > 0.0) - t.front) / t.rise;
 }
 
 /// The function's value at `u`, by the line of the interval.
 fn value_at(t: Track, u: f32) -> vec4f {
-    let low = knots[t.i].s;
-    let offset = clamp(t.front + t.rise * u, low, knots[t.i + 1u].s) - low;
+    let ends = knots[t.i].ends;
+    let offset = clamp(t.front + t.rise * u, ends.x, ends.y) - ends.x;
     return knots[t.i].value + knots[t.i].slope * offset;
 }
 

@@ -51,7 +51,7 @@ fn vertex(@builtin(vertex_index) index: u32) -> Drawn {
         let line = line_of(drawn.tags.y);
         drawn.line_value = line.value;
         drawn.line_slope = line.slope;
-        drawn.line_ends = vec2f(line.low, line.high);
+        drawn.line_ends = line.ends;
         if PLANE_PER_CELL {
             drawn.plane = plane_of(last_of(drawn_records[i].front), last_of(drawn_records[i].back), drawn_records[i].thickness);
         }
@@ -98,6 +98,6 @@ fn fragment(drawn: Drawn) -> @location(0) vec4f {
     let rise = back - front;
     back = select(front + rise * (end / length), back, end == length);
     front = select(front + rise * (start / length), front, start == 0.0);
-    let line = Line(drawn.line_value, drawn.line_slope, drawn.line_ends.x, drawn.line_ends.y);
+    let line = Line(drawn.line_value, drawn.line_slope, drawn.line_ends);
     return quantised(colored(front, back, end - start, drawn.tags.y, line), drawn.at.xy, drawn.tags.x);
 }

@@ -44,7 +44,7 @@ fn vertex(@builtin(vertex_index) index: u32) -> Drawn {
         let line = line_of(drawn.tags.z);
         drawn.line_value = line.value;
         drawn.line_slope = line.slope;
-        drawn.line_ends = vec2f(line.low, line.high);
+        drawn.line_ends = line.ends;
     }
     return drawn;
 }
@@ -78,6 +78,6 @@ fn fragment(drawn: Drawn) -> @location(0) vec4f {
     let here = drawn.value_right * offset.x + drawn.value_down * offset.y;
     let front = clamp(drawn.value + (here + drawn.value_near * near.x) * share.x, drawn.least, drawn.greatest);
     let back = clamp(drawn.value + (here + drawn.value_near * near.y) * share.y, drawn.least, drawn.greatest);
-    let line = Line(drawn.line_value, drawn.line_slope, drawn.line_ends.x, drawn.line_ends.y);
+    let line = Line(drawn.line_value, drawn.line_slope, drawn.line_ends);
     return quantised(colored(front, back, length, drawn.tags.z, line), drawn.at.xy, drawn.tags.x);
 }

@@ -8,13 +8,12 @@ fn most_work() -> u32 {
 struct Line {
     value: vec4f,
     slope: vec4f,
-    low: f32,
-    high: f32,
+    ends: vec2f,
 }
 
 /// The interval of the function that begins at the knot `i`.
 fn line_of(i: u32) -> Line {
-    return Line(knots[i].value, knots[i].slope, knots[i].s, knots[i + 1u].s);
+    return Line(knots[i].value, knots[i].slope, knots[i].ends);
 }
 
 /// The interval that a constant `s` is in.
@@ -35,10 +34,10 @@ fn integrated(front: Value, back: Value, length: f32, first: u32, first_line: Li
     var line = first_line;
     var u = 0.0;
     loop {
-        let is_last = low + range < line.high || i + 2u >= function.end;
-        let next = select(clamp((line.high - low) * share, u, 1.0), 1.0, is_last);
-        let a = line.value + line.slope * (clamp(low + range * u, line.low, line.high) - line.low);
-        let b = line.value + line.slope * (clamp(low + range * next, line.low, line.high) - line.low);
+        let is_last = low + range < line.ends.y || i + 2u >= function.end;
+        let next = select(clamp((line.ends.y - low) * share, u, 1.0), 1.0, is_last);
+        let a = line.value + line.slope * (clamp(low + range * u, line.ends.x, line.ends.y) - line.ends.x);
+        let b = line.value + line.slope * (clamp(low + range * next, line.ends.x, line.ends.y) - line.ends.x);
         var f = select(b, a, rises);
         var r = select(a, b, rises);
         if RGBA {

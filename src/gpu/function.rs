@@ -23,8 +23,8 @@ pub(crate) struct Function {
 pub(crate) struct Knot {
     pub(crate) value: [f32; 4],
     pub(crate) slope: [f32; 4],
-    pub(crate) s: f32,
-    pub(crate) padding: [f32; 3],
+    pub(crate) ends: [f32; 2],
+    pub(crate) padding: [f32; 2],
 }
 
 /// `Function`, its knots and its buckets: bindings 0 to 2 of group 0.
@@ -33,7 +33,10 @@ pub(crate) fn upload(gpu: &Gpu, exact: &Exact<f32>) -> Result<[Buffer; 3]> {
     let (mut knots, mut buckets) = (Vec::<Knot>::new(), Vec::<u32>::new());
     for f in functions {
         buckets.extend(f.bucket.iter().map(|b| b + knots.len() as u32));
-        let knot = |i: usize| Knot { value: f.value[i], slope: f.slope[i], s: f.s[i], padding: [0.0; 3] };
+        let knot = |i: usize| {
+            let ends = [f.s[i], *f.s.get(i + 1).unwrap_or(&f.s[i])];
+            Knot { value: f.value[i], slope: f.slope[i], ends, padding: [0.0; 2] }
+        };
         knots.extend((0..f.len()).map(knot));
     }
     let end = knots.len() as u32;

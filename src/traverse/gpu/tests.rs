@@ -95,7 +95,7 @@ fn layouts_match_their_rust_twins() {
     check!("Cell", Cell, corners neighbours);
     check!("Outer", Outer, points cell);
     check!("Box", Bounds, low high);
-    check!("Knot", Knot, value slope s);
+    check!("Knot", Knot, value slope ends);
     check!("Function", Function, opacity color end scale);
     check!("Counts", RawCounts, steps carry repaired unused);
     check!("Frame", Frame, origin direction size first_row rows near far planes has_ends leaves faces most_steps most_work);
