@@ -1,4 +1,5 @@
-//! The tables of the papers, made again: `cargo bench --bench papers` prints them beside what the papers report.
+//! The tables of the papers, made again: `cargo bench --bench papers` prints them beside what the papers report, and
+//! `cargo bench --bench papers -- bits`, `sizes` or `polynomials` one of them.
 //!
 //! Numbers of the papers are those of their machines of 2002: Röttger & Ertl, "A Two-Step Approach for Interactive Pre-Integrated Volume
 //! Rendering of Unstructured Grids", and Guthe, Röttger, Schieber, Straßer & Ertl, "High-Quality Unstructured Volume Rendering on the
@@ -158,21 +159,21 @@ fn seconds_by_size() {
             Construction::Sampled(sampling) => Table::sampled(&exact, Kind::Uniform, size, LONGEST, sampling),
         };
         let ways = [
+            ("closed form", Construction::Closed),
+            ("incremental", Construction::Incremental),
             ("software", Construction::Sampled(touched)),
             ("slices, as many steps", Construction::Sampled(fewer)),
             ("slices, o = 1", Construction::Sampled(all)),
-            ("incremental", Construction::Incremental),
-            ("closed form", Construction::Closed),
         ];
+        let mut table = Table::closed(&exact, Kind::Uniform, size, LONGEST).expect("a table");
+        let time = seconds(|| table.rebuild(&exact));
+        println!("{name:12} {:23} {time:>10.4}    {:.1e}", "closed form, in place", judged(&transfer, &table));
         for (way, how) in ways {
             let mut last = None;
             let time = seconds(|| last = make(how));
             let rms = judged(&transfer, &last.expect("a table"));
             println!("{name:12} {way:23} {time:>10.4}    {rms:.1e}");
         }
-        let mut table = Table::closed(&exact, Kind::Uniform, size, LONGEST).expect("a table");
-        let time = seconds(|| table.rebuild(&exact));
-        println!("{name:12} {:23} {time:>10.4}    {:.1e}", "closed form, in place", judged(&transfer, &table));
         let Some(device) = device(&transfer) else { continue };
         for (way, how) in ways {
             let mut last = None;
@@ -221,7 +222,15 @@ fn seconds_of_polynomials() {
 }
 
 fn main() {
-    errors_by_bits();
-    seconds_by_size();
-    seconds_of_polynomials();
+    let chosen: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
+    let wanted = |name: &str| chosen.is_empty() || chosen.iter().any(|c| name.contains(c.as_str()));
+    if wanted("bits") {
+        errors_by_bits();
+    }
+    if wanted("polynomials") {
+        seconds_of_polynomials();
+    }
+    if wanted("sizes") {
+        seconds_by_size();
+    }
 }
