@@ -55,10 +55,10 @@ struct Weights {
     through: Vec<f32>,
 }
 
-/// e^{−t} for t up to [`SHALLOW`], to f32.
+/// (1 − e^{−t})/t for t up to [`SHALLOW`], to f32.
 #[inline(always)]
-fn nearly_one(t: f32) -> f32 {
-    1.0 - t * (1.0 - t * (1.0 / 2.0 - t * (1.0 / 6.0 - t * (1.0 / 24.0 - t * (1.0 / 120.0 - t * (1.0 / 720.0))))))
+fn slope_of_opacity(t: f32) -> f32 {
+    1.0 - t * (1.0 / 2.0 - t * (1.0 / 6.0 - t * (1.0 / 24.0 - t * (1.0 / 120.0 - t * (1.0 / 720.0)))))
 }
 
 impl Weights {
@@ -68,7 +68,7 @@ impl Weights {
         let n = self.x.len();
         let (x, y) = (&self.x[..n], &self.y[..n]);
         let (front, back, through) = (&mut self.front[..n], &mut self.back[..n], &mut self.through[..n]);
-        let fade = |t: f32| if SHALLOW { nearly_one(t) } else { Real::exp(-t) };
+        let fade = |t: f32| if SHALLOW { 1.0 - t * slope_of_opacity(t) } else { Real::exp(-t) };
         for q in 0..n {
             let (mut of_front, mut of_back) = (0.0, 0.0);
             for [u, weight] in rule {
@@ -84,10 +84,32 @@ impl Weights {
         }
     }
 
+    /// The same for depths up to [`SHALLOW`], of chromatic emission, by the series of β in the mean depth D and the rise δ = y − x. With
+    /// T(u) = D u − ½ δ (u − u²) it is β = Ψ − e^{−D}, and the term of δᵏ Dᵐ in Ψ is (−1)ᵐ (m + k)! / (2ᵏ m! (m + 2k + 1)!).
+    #[inline(always)]
+    fn expand(&mut self) {
+        let n = self.x.len();
+        let (x, y) = (&self.x[..n], &self.y[..n]);
+        let (front, back, through) = (&mut self.front[..n], &mut self.back[..n], &mut self.through[..n]);
+        for q in 0..n {
+            let (d, rise) = ((x[q] + y[q]) * 0.5, y[q] - x[q]);
+            let even = d
+                * (1.0 / 2.0
+                    - d * (1.0 / 3.0 - d * (1.0 / 8.0 - d * (1.0 / 30.0 - d * (1.0 / 144.0 - d * (1.0 / 840.0))))));
+            let once = 1.0 / 12.0 - d * (1.0 / 24.0 - d * (1.0 / 80.0 - d * (1.0 / 360.0 - d * (1.0 / 2016.0))));
+            let twice = 1.0 / 240.0 - d * (1.0 / 480.0 - d * (1.0 / 1680.0 - d * (1.0 / 8064.0)));
+            let thrice = 1.0 / 6720.0 - d * (1.0 / 13_440.0);
+            let beta = even + rise * (once + rise * (twice + rise * thrice));
+            let alpha = d * slope_of_opacity(d);
+            (front[q], back[q], through[q]) = (alpha - beta, beta, 1.0 - alpha);
+        }
+    }
+
     /// The same for any depths.
     fn integrate_deep(&mut self, direct: bool) {
         for q in 0..self.x.len() {
-            let (x, y) = (self.x[q], self.y[q]);
+            // Squares must be finite, however long a segment of what is opaque.
+            let (x, y) = (self.x[q].min(1e18), self.y[q].min(1e18));
             if x.max(y) > PANEL as f32 {
                 let piece = Piece::new(x, y, direct);
                 (self.front[q], self.back[q]) = (piece.front, piece.back);
@@ -98,7 +120,9 @@ impl Weights {
 
     #[inline(always)]
     fn all<const DIRECT: bool>(&mut self, steepest: f32) {
-        if steepest <= SHALLOW as f32 {
+        if steepest <= SHALLOW as f32 && !DIRECT {
+            self.expand();
+        } else if steepest <= SHALLOW as f32 {
             self.integrate::<3, true, DIRECT>(&GAUSS_3);
         } else {
             self.integrate::<6, false, DIRECT>(&GAUSS_6);
@@ -225,9 +249,7 @@ impl<'a, const L: usize> Rows<'a, L> {
 /// 1 − e^{−depth}, accurate relative to itself.
 #[inline(always)]
 pub(super) fn opacity(depth: f32) -> f32 {
-    let d = depth;
-    let thin = d * (1.0 - d / 2.0 * (1.0 - d / 3.0 * (1.0 - d / 4.0 * (1.0 - d / 5.0 * (1.0 - d / 6.0)))));
-    if d < 0.25 { thin } else { 1.0 - Real::exp(-d) }
+    if depth < SHALLOW as f32 { depth * slope_of_opacity(depth) } else { 1.0 - Real::exp(-depth) }
 }
 
 /// Depths below this have no colour over opacity but the limit.

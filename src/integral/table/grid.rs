@@ -118,7 +118,10 @@ impl Grid {
         let emitted = [0, 1, 2].map(|k| self.emitted[j][k].minus(self.emitted[i][k]));
         let whole = if self.direct { j as f64 - i as f64 } else { self.depth[j].minus(self.depth[i]) };
         match whole.abs() > 0.0 {
-            true => emitted.map(|e| (e / whole).max(0.0)),
+            true => {
+                let over = 1.0 / whole;
+                emitted.map(|e| (e * over).max(0.0))
+            }
             false => [0, 1, 2].map(|k| (self.colour[i][k] + self.colour[j][k]) / 2.0),
         }
     }

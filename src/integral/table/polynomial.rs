@@ -68,60 +68,78 @@ impl Polynomial {
         if !is_scalar(exact) || degree == 0 {
             return None;
         }
-        let grid = Grid::new(exact, size);
-        let texels = match degree {
-            1 => Self::fill::<1>(&grid, 1, longest),
-            2 => Self::fill::<2>(&grid, 2, longest),
-            _ => Self::fill::<4>(&grid, degree as usize, longest),
-        };
-        Some(Polynomial { degree, size, longest, direct: exact.direct, texels })
+        let texels = vec![vec![[0.0; 4]; size as usize * size as usize]; degree as usize + 1];
+        let mut table = Polynomial { degree, size, longest, direct: exact.direct, texels };
+        table.fill_all(&Grid::new(exact, size));
+        Some(table)
     }
 
-    fn fill<const L: usize>(grid: &Grid, degree: usize, longest: f64) -> Vec<Vec<[f32; 4]>> {
-        let n = grid.size;
-        let inverse = inverse(degree);
+    /// This table of another function, in the memory that it has: faster than [`Polynomial::closed`], as that is then known to be there.
+    pub fn rebuild(&mut self, exact: &Exact<f64>) {
+        if is_scalar(exact) && self.size > 2 && self.degree <= 4 {
+            self.direct = exact.direct;
+            self.fill_all(&Grid::new(exact, self.size));
+        } else if let Some(new) = Self::new(exact, self.degree, self.size, self.longest) {
+            *self = new;
+        }
+    }
+
+    fn fill_all(&mut self, grid: &Grid) {
+        match self.degree {
+            1 => self.fill::<1>(grid),
+            2 => self.fill::<2>(grid),
+            _ => self.fill::<4>(grid),
+        }
+    }
+
+    fn fill<const L: usize>(&mut self, grid: &Grid) {
+        let (n, degree) = (grid.size, self.degree as usize);
         let mut weights = [[0.0; 5]; 5];
-        for (row, of) in weights.iter_mut().zip(&inverse) {
+        for (row, of) in weights.iter_mut().zip(&inverse(degree)) {
             row.iter_mut().zip(of).for_each(|(w, of)| *w = *of as f32);
         }
         // The first point is a limit; lanes beyond the last have no weight.
-        let lengths: [f32; L] = std::array::from_fn(|l| (longest * (l + 1).min(degree) as f64 / degree as f64) as f32);
+        let lengths: [f32; L] =
+            std::array::from_fn(|l| (self.longest * (l + 1).min(degree) as f64 / degree as f64) as f32);
         let most = (OPAQUE_DEPTH / f64::from(lengths[0])) as f32;
-        // Rows of the sheared table, so that each is written by one thread.
-        let mut sheared = vec![Lanes([[0.0; L]; 4]); n * n];
-        let mut limits = vec![[0.0; 3]; n * n];
-        sheared.par_chunks_mut(n).zip(limits.par_chunks_mut(n)).enumerate().for_each_init(
-            || Rows::new(grid, lengths),
-            |rows, (r, (row, limits))| {
+        // Colours at the points, and with the first, a limit, the mean extinction. Rows of the sheared table, so that each is written by
+        // one thread.
+        let points = L + 1;
+        let mut sheared = vec![[0.0f32; 4]; n * n * points];
+        sheared.par_chunks_mut(n * points).enumerate().for_each_init(
+            || (Rows::new(grid, lengths), vec![Lanes([[0.0; L]; 4]); n]),
+            |(rows, row), (r, sheared)| {
                 rows.row(r, row);
-                for (i, (lanes, limit)) in row.iter_mut().zip(limits).enumerate() {
+                for (i, (lanes, points)) in row.iter_mut().zip(sheared.chunks_exact_mut(points)).enumerate() {
                     let j = closed::behind(i, r, n);
                     closed::normalise(grid, [i, j], lanes, &lengths, most);
-                    *limit = grid.limit(i, j).map(|c| c as f32);
+                    let Lanes([red, green, blue, density]) = lanes;
+                    let [r, g, b] = grid.limit(i, j).map(|c| c as f32);
+                    points[0] = [r, g, b, density[0]];
+                    for (l, point) in points[1..].iter_mut().enumerate() {
+                        *point = [red[l], green[l], blue[l], 0.0];
+                    }
                 }
             },
         );
-        let mut texels = vec![vec![[0.0; 4]; n * n]; degree + 1];
         let mut by_row: Vec<Vec<&mut [[f32; 4]]>> = (0..n).map(|_| vec![]).collect();
-        for of in &mut texels {
+        for of in &mut self.texels {
             of.chunks_exact_mut(n).zip(&mut by_row).for_each(|(row, rows)| rows.push(row));
         }
         by_row.into_par_iter().enumerate().for_each(|(j, mut rows)| {
             for i in 0..n {
                 let at = if j >= i { j - i } else { j + n - i } * n + i;
-                let (Lanes([red, green, blue, density]), limit) = (&sheared[at], &limits[at]);
+                let points = &sheared[at * points..(at + 1) * points];
                 for (c, (row, weights)) in rows.iter_mut().zip(&weights).enumerate() {
-                    let mut sum = limit.map(|v| v * weights[0]);
-                    for l in 0..L {
-                        for (sum, v) in sum.iter_mut().zip([red[l], green[l], blue[l]]) {
-                            *sum += weights[l + 1] * v;
-                        }
+                    let mut sum = [0.0; 4];
+                    for (weight, point) in weights.iter().zip(points) {
+                        sum = std::array::from_fn(|k| sum[k] + weight * point[k]);
                     }
-                    row[i] = [sum[0], sum[1], sum[2], if c == 0 { density[0] } else { 0.0 }];
+                    sum[3] = if c == 0 { points[0][3] } else { 0.0 };
+                    row[i] = sum;
                 }
             }
         });
-        texels
     }
 
     /// Premultiplied colour and opacity of a segment, as a linear filter of the texels finds them.
