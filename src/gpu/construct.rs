@@ -6,7 +6,9 @@ use super::shader::{self, Variant};
 use super::{DeviceChoice, Gpu, function};
 use crate::error::Result;
 use crate::field::{self, Normal};
-use crate::integral::table::{Cylindrical, Kind, Nodes, OPAQUE_DEPTH, Polynomial, Sampling, Steps, Table, length};
+use crate::integral::table::{
+    Cylindrical, Kind, Nodes, OPAQUE_DEPTH, Polynomial, Sampling, Steps, THINNEST, Table, length,
+};
 use crate::integral::{Exact, table};
 use crate::transfer::TransferFunction;
 use bytemuck::{Pod, Zeroable};
@@ -200,8 +202,9 @@ impl Constructor {
     fn job(&self, size: u32, slices: u32, longest: f64, lengths: impl Iterator<Item = f64>) -> Job {
         let mut job = Job { size, slices, longest: longest as f32, ..Job::zeroed() };
         job.lengths.iter_mut().zip(lengths).for_each(|(to, l)| *to = l as f32);
-        let thinnest = if job.lengths[0] > 0.0 { job.lengths[0] } else { job.lengths[1] };
-        job.most = (OPAQUE_DEPTH / f64::from(thinnest)) as f32;
+        // Lengths of polynomials do not begin with 0.
+        let thinnest = if job.lengths[0] > 0.0 { longest * THINNEST } else { f64::from(job.lengths[1]) };
+        job.most = (OPAQUE_DEPTH / thinnest) as f32;
         job
     }
 

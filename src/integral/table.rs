@@ -21,7 +21,7 @@ pub use sampled::{Sampling, Steps};
 pub use volume::{Kind, Table, coordinate, length};
 
 pub(crate) use grid::Nodes;
-pub(crate) use polynomial::inverse;
+pub(crate) use polynomial::{THINNEST, inverse};
 pub(crate) use sampled::entries;
 pub(crate) use volume::OPAQUE_DEPTH;
 

@@ -152,3 +152,19 @@ fn limits_are_finite() {
     let refused = Lookup::new(&pair, &Choice::of(Form::Volume), 1.0).unwrap_err().to_string();
     assert!(refused.contains("one component"), "{refused}");
 }
+
+/// A cell that is 1000 times shorter than another, and dense.
+#[test]
+fn small_cells_beside_huge_ones_keep_their_extinction() {
+    let transfer = TransferFunction::new(vec![(0.0, [0.2, 0.5, 1.0])], vec![(-1.0, 500.0), (1.0, 900.0)], 1.0).unwrap();
+    let exact = Exact::<f64>::new(&transfer, field::Kind::Scalar, &UNIT, 1.0);
+    for form in [Form::Volume, Form::Polynomial] {
+        let table = Lookup::new(&exact, &Choice::of(form), 2.0).unwrap();
+        for l in [2e-4, 2e-3, 1e-2] {
+            let [.., blue, alpha] = table.look_up(0.0, 0.0, l);
+            let want = -(-700.0 * f64::from(l)).exp_m1();
+            assert!((f64::from(alpha) - want).abs() < 1e-5, "{form:?}, {l}: {alpha}, not {want}");
+            assert!((f64::from(blue) - want).abs() < 1e-5, "{form:?}, {l}: {blue}, not {want}");
+        }
+    }
+}

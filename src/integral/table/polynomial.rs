@@ -26,6 +26,9 @@ pub struct Polynomial {
     pub texels: Vec<Vec<[f32; 4]>>,
 }
 
+/// The share of the longest length at which a mean extinction may be opaque: cells of one mesh differ much in size.
+pub(crate) const THINNEST: f64 = 1.0 / 16384.0;
+
 /// A sum of powers that goes through points at 0, 1/n, …, 1: the rows give its coefficients from the values there.
 pub(crate) type Inverse = Vec<Vec<f64>>;
 
@@ -46,7 +49,7 @@ impl Polynomial {
                 let mut pieces = Pieces::new();
                 exact.for_each_piece(&[front], &[back], |f, b, share| pieces.push((f, b, share)));
                 let points: Vec<[f64; 4]> =
-                    lengths.iter().map(|&l| normalised(exact, front, back, &pieces, l, lengths[1])).collect();
+                    lengths.iter().map(|&l| normalised(exact, front, back, &pieces, l, longest * THINNEST)).collect();
                 let coefficient = |i: usize| {
                     let [r, g, b] =
                         [0, 1, 2].map(|k| points.iter().zip(&inverse[i]).map(|(p, w)| p[k] * w).sum::<f64>() as f32);
@@ -101,7 +104,7 @@ impl Polynomial {
         // The first point is a limit; lanes beyond the last have no weight.
         let lengths: [f32; L] =
             std::array::from_fn(|l| (self.longest * (l + 1).min(degree) as f64 / degree as f64) as f32);
-        let most = (OPAQUE_DEPTH / f64::from(lengths[0])) as f32;
+        let most = (OPAQUE_DEPTH / (self.longest * THINNEST)) as f32;
         // Colours at the points, and with the first, a limit, the mean extinction. Rows of the sheared table, so that each is written by
         // one thread.
         let points = L + 1;
