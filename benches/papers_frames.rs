@@ -1,5 +1,5 @@
-//! Frame rates that the papers on pre-integrated tables report, measured again: `cargo bench --bench papers_frames`. Graphics cards of
-//! 2002 and whatever draws here are no match; what one form takes beside another is.
+//! Frame rates that the papers on pre-integrated tables report, measured again: `cargo bench --bench papers_frames`; with `tiles` or
+//! `sorts` after that, one of them. Graphics cards of 2002 and whatever draws here are no match; what one form takes beside another is.
 
 #![allow(
     clippy::expect_used,
@@ -20,21 +20,25 @@ use halite::view::{Camera, Projection, View};
 use std::path::Path;
 use std::time::Instant;
 
-/// Frames of which the median is taken.
-const FRAMES: usize = 9;
+/// Frames of which the median is taken; of small pictures and of large ones.
+const FRAMES: [usize; 2] = [9, 3];
 
 fn main() {
-    // Whatever criterion's options are, here is none.
-    let renderer = Renderer::with_engine(0, DeviceChoice::Auto, Engine::Project).expect("a device that projects");
-    println!("on {}, medians of {FRAMES} frames\n", renderer.stats().adapter);
-    tiles_against_volumes(renderer);
-    let renderer = Renderer::with_engine(0, DeviceChoice::Auto, Engine::Project).expect("a device that projects");
-    sorts_and_data(renderer);
+    let chosen: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
+    let wanted = |name: &str| chosen.is_empty() || chosen.iter().any(|c| name.contains(c.as_str()));
+    let renderer = || Renderer::with_engine(0, DeviceChoice::Auto, Engine::Project).expect("a device that projects");
+    println!("on {}\n", renderer().stats().adapter);
+    if wanted("tiles") {
+        tiles_against_volumes(renderer());
+    }
+    if wanted("sorts") {
+        sorts_and_data(renderer());
+    }
 }
 
-/// Frames in a second. With `moving`, each from another side, so that cells are sorted anew.
+/// Frames in a second: the median. With `moving`, each from another side, so that cells are sorted anew.
 fn rate(renderer: &mut Renderer, camera: impl Fn(f64) -> Camera, size: [u32; 2], moving: bool) -> f64 {
-    let mut times: Vec<f64> = (0..=FRAMES)
+    let mut times: Vec<f64> = (0..=FRAMES[usize::from(moving)])
         .map(|i| {
             let view = View::new(camera(if moving { i as f64 } else { 0.0 }), size).expect("a view");
             let start = Instant::now();
