@@ -27,6 +27,7 @@ impl Sum {
         Sum { high, low: self.low + lost }
     }
 
+    #[inline(always)]
     pub(super) fn minus(self, other: Sum) -> f64 {
         (self.high - other.high) + (self.low - other.low)
     }
@@ -102,6 +103,7 @@ impl Grid {
     }
 
     /// ρ̂: the mean extinction from value `i` to value `j`.
+    #[inline]
     pub(super) fn density(&self, i: usize, j: usize) -> f64 {
         match i == j {
             true => f64::from(self.constant[i][0]),
@@ -110,6 +112,7 @@ impl Grid {
     }
 
     /// What colour over opacity (direct: over the length that is seen) becomes where nothing hides anything.
+    #[inline]
     pub(super) fn limit(&self, i: usize, j: usize) -> [f64; 3] {
         if i == j {
             let [_, r, g, b] = self.constant[i].map(f64::from);

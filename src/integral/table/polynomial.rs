@@ -29,6 +29,9 @@ pub struct Polynomial {
 /// The share of the longest length at which a mean extinction may be opaque: cells of one mesh differ much in size.
 pub(crate) const THINNEST: f64 = 1.0 / 16384.0;
 
+/// Rows of the sheared table that are built before they are written.
+const BAND: usize = 64;
+
 /// A sum of powers that goes through points at 0, 1/n, …, 1: the rows give its coefficients from the values there.
 pub(crate) type Inverse = Vec<Vec<f64>>;
 
@@ -73,7 +76,7 @@ impl Polynomial {
         }
         let texels = vec![vec![[0.0; 4]; size as usize * size as usize]; degree as usize + 1];
         let mut table = Polynomial { degree, size, longest, direct: exact.direct, texels };
-        table.fill_all(&Grid::new(exact, size));
+        table.fill(&Grid::new(exact, size));
         Some(table)
     }
 
@@ -81,68 +84,74 @@ impl Polynomial {
     pub fn rebuild(&mut self, exact: &Exact<f64>) {
         if is_scalar(exact) && self.size > 2 && self.degree <= 4 {
             self.direct = exact.direct;
-            self.fill_all(&Grid::new(exact, self.size));
+            self.fill(&Grid::new(exact, self.size));
         } else if let Some(new) = Self::new(exact, self.degree, self.size, self.longest) {
             *self = new;
         }
     }
 
-    fn fill_all(&mut self, grid: &Grid) {
+    fn fill(&mut self, grid: &Grid) {
         match self.degree {
-            1 => self.fill::<1>(grid),
-            2 => self.fill::<2>(grid),
-            _ => self.fill::<4>(grid),
+            1 => self.fill_of::<1, 2>(grid),
+            2 => self.fill_of::<2, 3>(grid),
+            _ => self.fill_of::<4, 5>(grid),
         }
     }
 
-    fn fill<const L: usize>(&mut self, grid: &Grid) {
+    /// For degrees up to `L`, with `P` = `L` + 1 points and coefficients.
+    fn fill_of<const L: usize, const P: usize>(&mut self, grid: &Grid) {
         let (n, degree) = (grid.size, self.degree as usize);
-        let mut weights = [[0.0; 5]; 5];
+        let mut weights = [[0.0; P]; P];
         for (row, of) in weights.iter_mut().zip(&inverse(degree)) {
             row.iter_mut().zip(of).for_each(|(w, of)| *w = *of as f32);
         }
-        // The first point is a limit; lanes beyond the last have no weight.
+        // The first point is a limit; points beyond the last have no weight.
         let lengths: [f32; L] =
             std::array::from_fn(|l| (self.longest * (l + 1).min(degree) as f64 / degree as f64) as f32);
         let most = (OPAQUE_DEPTH / (self.longest * THINNEST)) as f32;
-        // Colours at the points, and with the first, a limit, the mean extinction. Rows of the sheared table, so that each is written by
-        // one thread.
-        let points = L + 1;
-        let mut sheared = vec![[0.0f32; 4]; n * n * points];
-        sheared.par_chunks_mut(n * points).enumerate().for_each_init(
-            || (Rows::new(grid, lengths), vec![Lanes([[0.0; L]; 4]); n]),
-            |(rows, row), (r, sheared)| {
-                rows.row(r, row);
-                for (i, (lanes, points)) in row.iter_mut().zip(sheared.chunks_exact_mut(points)).enumerate() {
-                    let j = closed::behind(i, r, n);
-                    closed::normalise(grid, [i, j], lanes, &lengths, most);
-                    let Lanes([red, green, blue, density]) = lanes;
-                    let [r, g, b] = grid.limit(i, j).map(|c| c as f32);
-                    points[0] = [r, g, b, density[0]];
-                    for (l, point) in points[1..].iter_mut().enumerate() {
-                        *point = [red[l], green[l], blue[l], 0.0];
-                    }
-                }
-            },
-        );
         let mut by_row: Vec<Vec<&mut [[f32; 4]]>> = (0..n).map(|_| vec![]).collect();
         for of in &mut self.texels {
             of.chunks_exact_mut(n).zip(&mut by_row).for_each(|(row, rows)| rows.push(row));
         }
-        by_row.into_par_iter().enumerate().for_each(|(j, mut rows)| {
-            for i in 0..n {
-                let at = if j >= i { j - i } else { j + n - i } * n + i;
-                let points = &sheared[at * points..(at + 1) * points];
-                for (c, (row, weights)) in rows.iter_mut().zip(&weights).enumerate() {
-                    let mut sum = [0.0; 4];
-                    for (weight, point) in weights.iter().zip(points) {
-                        sum = std::array::from_fn(|k| sum[k] + weight * point[k]);
+        // Colours at the points, and with the first the mean extinction: some rows of the sheared table at a time, so that they stay in
+        // the cache, each written by one thread and read by another.
+        let mut sheared = vec![[[0.0f32; 4]; P]; n * BAND.min(n)];
+        for first in (0..n).step_by(BAND) {
+            let count = BAND.min(n - first);
+            sheared[..n * count].par_chunks_mut(n).enumerate().for_each_init(
+                || (Rows::new(grid, lengths), vec![Lanes([[0.0; L]; 4]); n]),
+                |(rows, row), (r, sheared)| {
+                    let r = first + r;
+                    rows.row(r, row);
+                    for (i, (lanes, points)) in row.iter_mut().zip(sheared).enumerate() {
+                        let j = closed::behind(i, r, n);
+                        closed::normalise(grid, [i, j], lanes, &lengths, most);
+                        let Lanes([red, green, blue, density]) = lanes;
+                        let [r, g, b] = grid.limit(i, j).map(|c| c as f32);
+                        points[0] = [r, g, b, density[0]];
+                        for l in 0..L {
+                            points[l + 1] = [red[l], green[l], blue[l], 0.0];
+                        }
                     }
-                    sum[3] = if c == 0 { points[0][3] } else { 0.0 };
-                    row[i] = sum;
+                },
+            );
+            by_row.par_iter_mut().enumerate().for_each(|(j, rows)| {
+                for r in 0..count {
+                    let i = if j >= first + r { j - first - r } else { j + n - first - r };
+                    let points = &sheared[r * n + i];
+                    for (c, (row, weights)) in rows.iter_mut().zip(&weights).enumerate() {
+                        let mut sum = [0.0; 4];
+                        for (weight, point) in weights.iter().zip(points) {
+                            for k in 0..4 {
+                                sum[k] += weight * point[k];
+                            }
+                        }
+                        sum[3] = if c == 0 { points[0][3] } else { 0.0 };
+                        row[i] = sum;
+                    }
                 }
-            }
-        });
+            });
+        }
     }
 
     /// Premultiplied colour and opacity of a segment, as a linear filter of the texels finds them.
