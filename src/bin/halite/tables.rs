@@ -39,7 +39,7 @@ pub(crate) struct Options {
     /// How much differences are magnified
     #[arg(long, value_name = "GAIN", default_value_t = 8.0)]
     gain: f32,
-    /// A sheet, a row for each form: the table at four lengths, each beside its difference from the exact integral (.png)
+    /// A sheet, a row for each line: the table at four lengths, each beside its difference from the exact integral (.png)
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// The planes of the cylindrical table as tiles of one picture (.png)

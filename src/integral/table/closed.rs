@@ -272,19 +272,17 @@ pub(super) fn normalise<const L: usize>(
         let depth = density * lengths[l];
         over[l] = if depth > THIN { scale / opacity(depth) } else { 0.0 };
     }
-    for k in 0..3 {
-        for l in 0..L {
-            lanes.0[k][l] *= over[l];
+    for color in &mut lanes.0[..3] {
+        for (color, over) in color.iter_mut().zip(over) {
+            *color *= over;
         }
     }
     lanes.0[3] = [density.min(most); L];
     if lengths.iter().any(|l| density * l <= THIN) {
         let limit = grid.limit(i, j);
-        for k in 0..3 {
-            for l in 0..L {
-                if density * lengths[l] <= THIN {
-                    lanes.0[k][l] = limit[k] as f32;
-                }
+        for (color, limit) in lanes.0.iter_mut().zip(limit) {
+            for (color, _) in color.iter_mut().zip(lengths).filter(|(_, l)| density * **l <= THIN) {
+                *color = limit as f32;
             }
         }
     }

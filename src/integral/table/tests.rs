@@ -365,7 +365,6 @@ fn errors_are_within_their_bounds() {
                     (table.look_up(front, back, longest * l), published(&exact, front, back, longest * l));
                 most = (0..4).fold(most, |m, k| m.max((got[k] - want[k]).abs()));
             }
-            println!("{name}, {n}, {longest}: {most:.2e} of {bound:.2e}");
             assert!(most <= bound && most >= 0.05 * bound, "{name}, {n}, {longest}: {most} of {bound}");
         }
     }
