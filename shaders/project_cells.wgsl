@@ -184,11 +184,8 @@ fn outline(a: vec4f) -> vec4u {
         let i = select(select(select(3u, 2u, few.z), 1u, few.y), 0u, few.x);
         let j = select(select(select(0u, 1u, few.y), 2u, few.z), 3u, few.w);
         let others = 6u - i - j;
-        // The other two, of which the sum and the product with what is left decide: the smallest index that is free, and the rest.
-        var k = 0u;
-        while k == i || k == j {
-            k++;
-        }
+        // The other two: the smallest index that is free, and the rest.
+        let k = select(select(2u, 1u, i != 1u && j != 1u), 0u, i != 0u && j != 0u);
         return vec4u(i, k, j, others - k);
     }
     let inside = select(select(select(3u, 2u, few.z), 1u, few.y), 0u, few.x);

@@ -20,8 +20,8 @@ fn pixel_of(p: vec3f) -> vec2f {
 }
 
 /// The smallest upright rectangle around what is seen of a cell some of whose corners are beside or behind the eye.
-fn box_of(p: array<vec3f, 4>) -> array<vec2f, 4> {
-    var all = array<vec3f, 4>(seen(p[0]), seen(p[1]), seen(p[2]), seen(p[3]));
+fn box_of(corners: array<vec3f, 4>) -> array<vec2f, 4> {
+    var all = corners;
     var low = vec2f(FAR);
     var high = vec2f(-FAR);
     for (var i = 0u; i < 4u; i++) {
@@ -44,58 +44,52 @@ fn box_of(p: array<vec3f, 4>) -> array<vec2f, 4> {
     return array<vec2f, 4>(low, vec2f(high.x, low.y), high, vec2f(low.x, high.y));
 }
 
-/// The corners `q` around an outline, of which the fourth may be the first, moved outward so that all edges are GROWTH further out.
-fn grown(corners: array<vec2f, 4>) -> array<vec2f, 4> {
-    var q = corners;
-    var moved = q;
-    let is_triangle = all(q[3] == q[0]);
-    let n = select(4u, 3u, is_triangle);
-    let diagonals = select((q[2].x - q[0].x) * (q[3].y - q[1].y) - (q[2].y - q[0].y) * (q[3].x - q[1].x),
-        (q[1].x - q[0].x) * (q[2].y - q[0].y) - (q[1].y - q[0].y) * (q[2].x - q[0].x), is_triangle);
-    let turn = select(-1.0, 1.0, diagonals > 0.0);
-    var sharp = false;
-    for (var i = 0u; i < n; i++) {
-        let before = q[i] - q[(i + n - 1u) % n];
-        let after = q[(i + 1u) % n] - q[i];
-        let lengths = vec2f(length(before), length(after));
-        let u = before / lengths.x;
-        let v = after / lengths.y;
+fn least_of(v: vec4f) -> f32 {
+    return min(min(v.x, v.y), min(v.z, v.w));
+}
+
+fn greatest_of(v: vec4f) -> f32 {
+    return max(max(v.x, v.y), max(v.z, v.w));
+}
+
+/// The corners (x, y) around an outline, of which the fourth may be the first, moved outward so that all edges are GROWTH further out.
+fn grown(x: vec4f, y: vec4f) -> array<vec2f, 4> {
+    let is_triangle = x.w == x.x && y.w == y.x;
+    let turn = select(-1.0, 1.0, (x.z - x.x) * (y.w - y.y) - (y.z - y.x) * (x.w - x.y) > 0.0);
+    // Directions of the edges after each corner and before it; a triangle has no fourth.
+    let across = x.yzwx - x;
+    let down = y.yzwx - y;
+    let after = sqrt(across * across + down * down);
+    let after_x = across / after;
+    let after_y = down / after;
+    let before = vec4f(select(after.w, after.z, is_triangle), after.xyz);
+    let before_x = vec4f(select(after_x.w, after_x.z, is_triangle), after_x.xyz);
+    let before_y = vec4f(select(after_y.w, after_y.z, is_triangle), after_y.xyz);
+    let reach = 1.0 + before_x * after_x + before_y * after_y;
+    let blunt = (min(before, after) > vec4f(1e-6)) & (reach > vec4f(2e-4)) & (reach <= vec4f(2.001));
+    if all(blunt.xyz) && (blunt.w || is_triangle) {
         // Outward normals of the edges before and after, and the way out between them.
-        let out = (vec2f(u.y, -u.x) + vec2f(v.y, -v.x)) * turn;
-        let reach = 1.0 + dot(u, v);
-        if !(min(lengths.x, lengths.y) > 1e-6) || !(reach > 2e-4) || !(reach <= 2.001) {
-            sharp = true;
-        } else {
-            moved[i] = q[i] + out * (GROWTH / reach);
-        }
-    }
-    if !sharp {
-        if is_triangle {
-            moved[3] = moved[0];
-        }
-        return moved;
+        let out = turn * GROWTH / reach;
+        let moved_x = x + (before_y + after_y) * out;
+        let moved_y = y - (before_x + after_x) * out;
+        let first = vec2f(moved_x.x, moved_y.x);
+        return array<vec2f, 4>(first, vec2f(moved_x.y, moved_y.y), vec2f(moved_x.z, moved_y.z), select(vec2f(moved_x.w, moved_y.w), first, is_triangle));
     }
     // A sliver: the rectangle around it, along its longest side or diagonal.
-    var axis = q[1] - q[0];
-    for (var i = 0u; i < 4u; i++) {
-        for (var j = 0u; j < i; j++) {
-            let side = q[i] - q[j];
-            axis = select(axis, side, dot(side, side) > dot(axis, axis));
-        }
-    }
+    let q = array<vec2f, 4>(vec2f(x.x, y.x), vec2f(x.y, y.y), vec2f(x.z, y.z), vec2f(x.w, y.w));
+    let axis = longer(longer(longer(q[1] - q[0], q[2] - q[0]), longer(q[2] - q[1], q[3] - q[0])), longer(q[3] - q[1], q[3] - q[2]));
     let long = length(axis);
     let u = select(vec2f(1.0, 0.0), axis / long, long > 0.0);
     let v = vec2f(-u.y, u.x);
-    var low = vec2f(0.0);
-    var high = vec2f(0.0);
-    for (var i = 1u; i < 4u; i++) {
-        let d = vec2f(dot(q[i] - q[0], u), dot(q[i] - q[0], v));
-        low = min(low, d);
-        high = max(high, d);
-    }
-    low -= GROWTH;
-    high += GROWTH;
+    let along = (x - x.x) * u.x + (y - y.x) * u.y;
+    let aside = (x - x.x) * v.x + (y - y.x) * v.y;
+    let low = vec2f(least_of(along), least_of(aside)) - GROWTH;
+    let high = vec2f(greatest_of(along), greatest_of(aside)) + GROWTH;
     return array<vec2f, 4>(q[0] + u * low.x + v * low.y, q[0] + u * high.x + v * low.y, q[0] + u * high.x + v * high.y, q[0] + u * low.x + v * high.y);
+}
+
+fn longer(a: vec2f, b: vec2f) -> vec2f {
+    return select(a, b, dot(b, b) > dot(a, a));
 }
 
 /// Depths that are as good as none, and volumes and slopes that f32 may not divide by.
@@ -105,15 +99,19 @@ const FLAT = 1e-30;
 fn record_of(solid: Solid, v: array<Value, 4>, piece: u32, rank: u32) -> Record {
     var p = solid.p;
     var record: Record;
-    let w = vec4f(seen(p[0]).z, seen(p[1]).z, seen(p[2]).z, seen(p[3]).z);
+    let corners = array<vec3f, 4>(seen(p[0]), seen(p[1]), seen(p[2]), seen(p[3]));
+    let w = vec4f(corners[0].z, corners[1].z, corners[2].z, corners[3].z);
     let centroid = p[0] + (solid.b + solid.c + solid.d) * 0.25;
     var centre: vec2f;
     if any(w < vec4f(frame.nearest)) {
-        record.outline = box_of(p);
+        record.outline = box_of(corners);
         centre = (record.outline[0] + record.outline[2]) * 0.5;
     } else {
         let around = outline(dependency(p));
-        record.outline = grown(array<vec2f, 4>(pixel_of(seen(p[around.x])), pixel_of(seen(p[around.y])), pixel_of(seen(p[around.z])), pixel_of(seen(p[around.w]))));
+        let at = array<vec2f, 4>(pixel_of(corners[0]), pixel_of(corners[1]), pixel_of(corners[2]), pixel_of(corners[3]));
+        let x = vec4f(at[0].x, at[1].x, at[2].x, at[3].x);
+        let y = vec4f(at[0].y, at[1].y, at[2].y, at[3].y);
+        record.outline = grown(vec4f(x[around.x], x[around.y], x[around.z], x[around.w]), vec4f(y[around.x], y[around.y], y[around.z], y[around.w]));
         centre = pixel_of(seen(centroid));
     }
     centre = floor(clamp(centre, vec2f(0.0), frame.size - 1.0)) + 0.5;
