@@ -158,7 +158,7 @@ fn project_all(@builtin(global_invocation_id) id: vec3u) {
         }
     }
     let corners = cells(cell);
-    records[i] = record_of(solid_of(corners), values_of(cell, corners), piece, part.rank + i);
+    write_record(i, solid_of(corners), values_of(cell, corners), piece, part.rank + i);
 }
 
 /// How the four directions from the eye to the corners depend on each other: Σ a p = 0, the sum of a being six volumes. For a

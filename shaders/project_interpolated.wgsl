@@ -3,33 +3,12 @@
 // Kraus, Qiao & Ebert 2004, section 2: of a linear function f only f/w and 1/w are linear on the screen, on the front and on
 // the back; their quotient is what a fragment needs.
 
-/// What is drawn of a cell: a fan of triangles around its thickest point.
-struct Record {
-    /// In pixels: around the outline, and of the thickest point.
-    outline: array<vec2f, 4>,
-    thick: vec2f,
-    /// The rank, and the longest edge.
-    rank: u32,
-    longest: f32,
-    /// Of the outline's corners: 1/w, or depth in a parallel view.
-    depths: array<f32, 4>,
-    /// The same of the front and the back of the thickest point, and how much they differ.
-    front_depth: f32,
-    back_depth: f32,
-    difference: f32,
-    /// Of the thickest point: how long the ray's way is.
-    thickness: f32,
-    /// The interval of the function that the least value is in.
-    interval: u32,
-    unused: u32,
-    /// Of the outline's corners, and of the front and the back of the thickest point.
-    values: array<Value, 4>,
-    front: Value,
-    back: Value,
-    /// The range of the corners' values.
-    least: Value,
-    greatest: Value,
-}
+// A record is a fan of triangles around the thickest point, which is the first vertex; the outline follows. Each vertex has the values
+// on the front and on the back (for INTERPOLATED, over w), 1/w (depth in a parallel view) of both, how much they differ, and how long
+// the ray's way is. The words of a record:
+// 0–2  the line of the function at the least value: value, slope, ends; then the longest edge, and the rank;
+// 3    the interval of that line; and which plane of a cylindrical table holds the thickest point.
+// The values: the least and the greatest.
 
 /// To pixels from the upper left corner of the image.
 fn pixel_of(p: vec3f) -> vec2f {
@@ -50,9 +29,18 @@ struct Piece {
 }
 
 /// A record of nothing.
-fn nothing(p: array<vec3f, 4>, v: array<Value, 4>, rank: u32) -> Record {
-    let at = array<vec2f, 4>(vec2f(-9.0), vec2f(-9.0), vec2f(-9.0), vec2f(-9.0));
-    return Record(at, vec2f(-9.0), rank, 0.0, array<f32, 4>(1.0, 1.0, 1.0, 1.0), 1.0, 1.0, 0.0, 0.0, 0u, 0u, v, v[0], v[0], v[0], v[0]);
+fn write_nothing(i: u32) {
+    for (var k = 0u; k < 5u; k++) {
+        records[i].vertices[k].corner = vec2f(-9.0);
+    }
+}
+
+fn write_vertex(i: u32, k: u32, corner: vec2f, front: Value, back: Value, depths: vec4f) {
+    let is_over_w = FORM == INTERPOLATED && frame.perspective == 1u;
+    records[i].vertices[k].corner = corner;
+    records[i].vertices[k].front = front * select(1.0, depths.x, is_over_w);
+    records[i].vertices[k].back = back * select(1.0, depths.y, is_over_w);
+    records[i].vertices[k].depths = depths;
 }
 
 /// The piece of a cell that lies behind the plane at the depth `frame.nearest`. With one corner behind it, the first piece is all;
@@ -132,14 +120,15 @@ fn anticlockwise(corners: array<vec3f, 4>, around: vec4u) -> vec4u {
     return select(around, around.xwzy, a.x * b.y - a.y * b.x > 0.0);
 }
 
-fn record_of(whole: Solid, values: array<Value, 4>, piece: u32, rank: u32) -> Record {
+fn write_record(i: u32, whole: Solid, values: array<Value, 4>, piece: u32, rank: u32) {
     let corners = whole.p;
     var p = corners;
     var v = values;
     if frame.perspective == 1u {
         let left = cut(p, v, piece);
         if !left.exists {
-            return nothing(corners, values, rank);
+            write_nothing(i);
+            return;
         }
         p = left.p;
         v = left.v;
@@ -151,7 +140,8 @@ fn record_of(whole: Solid, values: array<Value, 4>, piece: u32, rank: u32) -> Re
     let negative = max(-a, vec4f(0.0));
     let sums = vec2f(positive.x + positive.y + positive.z + positive.w, negative.x + negative.y + negative.z + negative.w);
     if !(sums.x > 0.0 && sums.y > 0.0) {
-        return nothing(corners, values, rank);
+        write_nothing(i);
+        return;
     }
     var one = positive / sums.x;
     var other = negative / sums.y;
@@ -174,22 +164,25 @@ fn record_of(whole: Solid, values: array<Value, 4>, piece: u32, rank: u32) -> Re
     let low = min(min(v[0], v[1]), min(v[2], v[3]));
     let high = max(max(v[0], v[1]), max(v[2], v[3]));
     let longest = max(max(max(length(edges[0]), length(edges[1])), max(length(edges[2]), distance(p[1], p[2]))), max(distance(p[1], p[3]), distance(p[2], p[3])));
-    return Record(
-        array<vec2f, 4>(pixel_of(seen(p[around.x])), pixel_of(seen(p[around.y])), pixel_of(seen(p[around.z])), pixel_of(seen(p[around.w]))),
-        pixel_of(inside),
-        rank,
-        longest,
-        array<f32, 4>(reach_of(p[around.x]), reach_of(p[around.y]), reach_of(p[around.z]), reach_of(p[around.w])),
-        front_depth,
-        back_depth,
-        difference,
-        length(apart),
-        interval_of(last_of(low)),
-        0u,
-        array<Value, 4>(v[around.x], v[around.y], v[around.z], v[around.w]),
-        v[0] * one.x + v[1] * one.y + v[2] * one.z + v[3] * one.w,
-        v[0] * other.x + v[1] * other.y + v[2] * other.z + v[3] * other.w,
-        low,
-        high,
-    );
+    let front_value = v[0] * one.x + v[1] * one.y + v[2] * one.z + v[3] * one.w;
+    let back_value = v[0] * other.x + v[1] * other.y + v[2] * other.z + v[3] * other.w;
+    let thickness = length(apart);
+    write_vertex(i, 0u, pixel_of(inside), front_value, back_value, vec4f(front_depth, back_depth, difference, thickness));
+    for (var k = 0u; k < 4u; k++) {
+        let c = around[k];
+        let reach = reach_of(p[c]);
+        write_vertex(i, k + 1u, pixel_of(seen(p[c])), v[c], v[c], vec4f(reach, reach, 0.0, 0.0));
+    }
+    let interval = interval_of(last_of(low));
+    let line = line_of(interval);
+    var plane = 0.0;
+    if PLANE_PER_CELL {
+        plane = plane_of(last_of(front_value), last_of(back_value), thickness);
+    }
+    var words: array<vec4f, 4>;
+    words[0] = line.value;
+    words[1] = line.slope;
+    words[2] = vec4f(line.ends, longest, f32(rank & 0xffffffu));
+    words[3] = vec4f(f32(interval), plane, 0.0, 0.0);
+    store(i, words, Values(low, high));
 }

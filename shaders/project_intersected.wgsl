@@ -1,18 +1,11 @@
 // The form that intersects each pixel's ray with the cell: the outline only says which pixels may be met.
 
-/// What is drawn of a cell: a quadrilateral, and the cell as fragments need it.
-struct Record {
-    outline: array<vec2f, 4>,
-    facets: Facets,
-    /// The centre of the pixel from which facets and values count, and the limits of the rays.
-    middle: vec4f,
-    /// Depth and t there, the longest edge, and 6 volumes.
-    extent: vec4f,
-    /// The rank, which facets are entered, and the interval of the function that holds the least value.
-    tags: vec4u,
-    /// Value in the middle; how it rises from pixel to pixel to the right and down, and towards the eye; the range of the corners'.
-    values: array<Value, 6>,
-}
+// The words of a record:
+// 0–2  the cell's facets, counted from the middle of a pixel amid it;
+// 3    that middle, and the nearnesses between which rays are seen;
+// 4    depth and t there, the longest edge, and the interval of the function that holds the least value;
+// 5–7  the line of that interval: value, slope, ends; then the rank, and which facets are entered.
+// The values: in the middle; how it rises from pixel to pixel to the right and down, and towards the eye; the least and the greatest.
 
 /// To pixels from the upper left corner of the image.
 fn pixel_of(p: vec3f) -> vec2f {
@@ -96,22 +89,22 @@ fn longer(a: vec2f, b: vec2f) -> vec2f {
 const AT_EYE = 1e-6;
 const FLAT = 1e-30;
 
-fn record_of(solid: Solid, v: array<Value, 4>, piece: u32, rank: u32) -> Record {
+fn write_record(i: u32, solid: Solid, v: array<Value, 4>, piece: u32, rank: u32) {
     var p = solid.p;
-    var record: Record;
+    var around: array<vec2f, 4>;
     let corners = array<vec3f, 4>(seen(p[0]), seen(p[1]), seen(p[2]), seen(p[3]));
     let w = vec4f(corners[0].z, corners[1].z, corners[2].z, corners[3].z);
     let centroid = p[0] + (solid.b + solid.c + solid.d) * 0.25;
     var centre: vec2f;
     if any(w < vec4f(frame.nearest)) {
-        record.outline = box_of(corners);
-        centre = (record.outline[0] + record.outline[2]) * 0.5;
+        around = box_of(corners);
+        centre = (around[0] + around[2]) * 0.5;
     } else {
-        let around = outline(dependency(p));
+        let o = outline(dependency(p));
         let at = array<vec2f, 4>(pixel_of(corners[0]), pixel_of(corners[1]), pixel_of(corners[2]), pixel_of(corners[3]));
         let x = vec4f(at[0].x, at[1].x, at[2].x, at[3].x);
         let y = vec4f(at[0].y, at[1].y, at[2].y, at[3].y);
-        record.outline = grown(vec4f(x[around.x], x[around.y], x[around.z], x[around.w]), vec4f(y[around.x], y[around.y], y[around.z], y[around.w]));
+        around = grown(vec4f(x[o.x], x[o.y], x[o.z], x[o.w]), vec4f(y[o.x], y[o.y], y[o.z], y[o.w]));
         centre = pixel_of(seen(centroid));
     }
     centre = floor(clamp(centre, vec2f(0.0), frame.size - 1.0)) + 0.5;
@@ -138,34 +131,40 @@ fn record_of(solid: Solid, v: array<Value, 4>, piece: u32, rank: u32) -> Record 
         slopes -= heights;
     }
     slopes = select(slopes, vec4f(FLAT), abs(slopes) < vec4f(FLAT));
-    record.facets = Facets(
-        heights / slopes,
-        vec4f(dot(right, n[0]), dot(right, n[1]), dot(right, n[2]), dot(right, n[3])) / slopes,
-        vec4f(dot(down, n[0]), dot(down, n[1]), dot(down, n[2]), dot(down, n[3])) / slopes,
-    );
+    var words: array<vec4f, 8>;
+    words[0] = heights / slopes;
+    words[1] = vec4f(dot(right, n[0]), dot(right, n[1]), dot(right, n[2]), dot(right, n[3])) / slopes;
+    words[2] = vec4f(dot(down, n[0]), dot(down, n[1]), dot(down, n[2]), dot(down, n[3])) / slopes;
     let entered = (slopes > vec4f(0.0)) == vec4<bool>(volume > 0.0);
     let bits = select(vec4u(0u), vec4u(1u, 2u, 4u, 8u), entered);
     if !(abs(volume) > FLAT) {
-        record.outline = array<vec2f, 4>(vec2f(-9.0), vec2f(-9.0), vec2f(-9.0), vec2f(-9.0));
+        around = array<vec2f, 4>(vec2f(-9.0), vec2f(-9.0), vec2f(-9.0), vec2f(-9.0));
     }
     var limits = vec2f(t - frame.near, t - frame.far);
     if frame.perspective == 1u {
         limits = depth / max(vec2f(frame.near, frame.far) + frame.forward.w, vec2f(AT_EYE)) - 1.0;
     }
-    record.middle = vec4f(centre, limits);
+    words[3] = vec4f(centre, limits);
     let longest = max(max(max(length(solid.b), length(solid.c)), max(length(solid.d), distance(solid.b, solid.c))), max(distance(solid.b, solid.d), distance(solid.c, solid.d)));
-    record.extent = vec4f(depth, t, longest, abs(volume));
     let rises = array<Value, 3>((v[1] - v[0]) / volume, (v[2] - v[0]) / volume, (v[3] - v[0]) / volume);
     let low = min(min(v[0], v[1]), min(v[2], v[3]));
     let high = max(max(v[0], v[1]), max(v[2], v[3]));
-    record.values = array<Value, 6>(
+    let interval = interval_of(last_of(low));
+    let line = line_of(interval);
+    words[4] = vec4f(depth, t, longest, f32(interval));
+    words[5] = line.value;
+    words[6] = line.slope;
+    words[7] = vec4f(line.ends, f32(rank & 0xffffffu), f32(bits.x | bits.y | bits.z | bits.w));
+    store(i, words, Values(
         v[0] + (rises[0] * dot(away, n[1]) + rises[1] * dot(away, n[2]) + rises[2] * dot(away, n[3])),
         rises[0] * dot(right, n[1]) + rises[1] * dot(right, n[2]) + rises[2] * dot(right, n[3]),
         rises[0] * dot(down, n[1]) + rises[1] * dot(down, n[2]) + rises[2] * dot(down, n[3]),
         -(rises[0] * dot(out, n[1]) + rises[1] * dot(out, n[2]) + rises[2] * dot(out, n[3])),
         low,
         high,
-    );
-    record.tags = vec4u(rank, bits.x | bits.y | bits.z | bits.w, interval_of(last_of(low)), 0u);
-    return record;
+    ));
+    records[i].vertices[0].corner = around[0];
+    records[i].vertices[1].corner = around[1];
+    records[i].vertices[2].corner = around[2];
+    records[i].vertices[3].corner = around[3];
 }

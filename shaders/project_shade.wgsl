@@ -1,8 +1,19 @@
-// From a segment of a ray to a fragment.
+// From a segment of a ray to a fragment; and from a stored corner to a vertex.
+
+/// Of each triangle the first vertex's words are taken. Positions have w = 1, so that all that is not flat is interpolated linearly on the screen.
+@vertex
+fn vertex(stored: Stored) -> Drawn {
+    let at = stored.corner / frame.size;
+    return drawn_at(vec4f(2.0 * at.x - 1.0, 1.0 - 2.0 * at.y, 0.5, 1.0), stored);
+}
 
 fn most_work() -> u32 {
     return MOST_WORK;
 }
+
+/// The intervals of the function, LINES_ACROSS in a row: value, slope, and ends below each other. A texture, as drivers in software
+/// look buffers up lane by lane.
+@group(0) @binding(10) var lines: texture_2d<f32>;
 
 /// A line of the function of the last component, and between which values it is that.
 struct Line {
@@ -13,7 +24,9 @@ struct Line {
 
 /// The interval of the function that begins at the knot `i`.
 fn line_of(i: u32) -> Line {
-    return Line(knots[i].value, knots[i].slope, knots[i].ends);
+    let at = vec2u(i % LINES_ACROSS, 3u * (i / LINES_ACROSS));
+    let ends = textureLoad(lines, at + vec2u(0u, 2u), 0).xy;
+    return Line(textureLoad(lines, at, 0), textureLoad(lines, at + vec2u(0u, 1u), 0), ends);
 }
 
 /// The interval that a constant `s` is in.

@@ -4,6 +4,7 @@
 
 pub(crate) mod arrays;
 pub(crate) mod buffers;
+pub(crate) mod clock;
 pub mod construct;
 pub(crate) mod function;
 pub(crate) mod raster;

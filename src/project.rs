@@ -6,6 +6,7 @@
 
 mod frame;
 pub(crate) mod gpu;
+mod record;
 
 use serde::{Deserialize, Serialize};
 

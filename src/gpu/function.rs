@@ -2,6 +2,7 @@
 
 use super::Gpu;
 use super::buffers::Buffer;
+use super::raster::Texture;
 use crate::error::Result;
 use crate::integral::{Exact, Knots};
 use bytemuck::{Pod, Zeroable};
@@ -27,23 +28,56 @@ pub(crate) struct Knot {
     pub(crate) padding: [f32; 2],
 }
 
+/// Intervals in a row of [`lines`].
+pub(crate) const LINES_ACROSS: usize = 4096;
+
+fn functions(exact: &Exact<f32>) -> impl Iterator<Item = &Knots<f32>> {
+    [Some(&exact.opacity), exact.color.as_ref()].into_iter().flatten()
+}
+
+fn knots(exact: &Exact<f32>) -> Vec<Knot> {
+    let of = |f: &Knots<f32>, i: usize| {
+        let ends = [f.s[i], *f.s.get(i + 1).unwrap_or(&f.s[i])];
+        Knot { value: f.value[i], slope: f.slope[i], ends, padding: [0.0; 2] }
+    };
+    functions(exact).flat_map(|f| (0..f.len()).map(move |i| of(f, i))).collect()
+}
+
 /// `Function`, its knots and its buckets: bindings 0 to 2 of group 0.
 pub(crate) fn upload(gpu: &Gpu, exact: &Exact<f32>) -> Result<[Buffer; 3]> {
-    let functions: Vec<&Knots<f32>> = [Some(&exact.opacity), exact.color.as_ref()].into_iter().flatten().collect();
-    let (mut knots, mut buckets) = (Vec::<Knot>::new(), Vec::<u32>::new());
-    for f in functions {
-        buckets.extend(f.bucket.iter().map(|b| b + knots.len() as u32));
-        let knot = |i: usize| {
-            let ends = [f.s[i], *f.s.get(i + 1).unwrap_or(&f.s[i])];
-            Knot { value: f.value[i], slope: f.slope[i], ends, padding: [0.0; 2] }
-        };
-        knots.extend((0..f.len()).map(knot));
+    let (mut first, mut buckets) = (0, Vec::<u32>::new());
+    for f in functions(exact) {
+        buckets.extend(f.bucket.iter().map(|b| b + first));
+        first += f.len() as u32;
     }
-    let end = knots.len() as u32;
-    let function = Function { opacity: 0, color: exact.opacity.len() as u32, end, scale: exact.scale };
+    let function = Function { opacity: 0, color: exact.opacity.len() as u32, end: first, scale: exact.scale };
     Ok([
         Buffer::holding(gpu, "function", &[function], Usage::UNIFORM)?,
-        Buffer::holding(gpu, "knots", &knots, Usage::STORAGE)?,
+        Buffer::holding(gpu, "knots", &knots(exact), Usage::STORAGE)?,
         Buffer::holding(gpu, "buckets", &buckets, Usage::STORAGE)?,
     ])
+}
+
+/// The knots as a texture: value, slope, and ends below each other, [`LINES_ACROSS`] in a row.
+///
+/// # Errors
+/// Those of [`Texture::new`].
+pub(crate) fn lines(gpu: &Gpu, exact: &Exact<f32>) -> Result<Texture> {
+    let mut knots = knots(exact);
+    let across = knots.len().min(LINES_ACROSS);
+    let down = knots.len().div_ceil(LINES_ACROSS);
+    knots.resize(across * down, Knot::zeroed());
+    let texels: Vec<[f32; 4]> = knots
+        .chunks(across)
+        .flat_map(|row| {
+            let ends = |k: &Knot| [k.ends[0], k.ends[1], 0.0, 0.0];
+            row.iter().map(|k| k.value).chain(row.iter().map(|k| k.slope)).chain(row.iter().map(ends))
+        })
+        .collect();
+    let size = [across as u32, 3 * down as u32];
+    let format = wgpu::TextureFormat::Rgba32Float;
+    let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
+    let texture = Texture::new(gpu, "lines", wgpu::TextureDimension::D2, [size[0], size[1], 1], format, usage)?;
+    texture.write(gpu, [0; 3], size, bytemuck::cast_slice(&texels));
+    Ok(texture)
 }

@@ -58,6 +58,21 @@ impl Texture {
         gpu.check()?;
         Ok(texture)
     }
+
+    /// Hands over `bytes`, which fill a rectangle of `width` and `height` at `x`, `y` of the layer or slice `z`.
+    pub(crate) fn write(&self, gpu: &Gpu, [x, y, z]: [u32; 3], [width, height]: [u32; 2], bytes: &[u8]) {
+        gpu.uploaded.fetch_add(bytes.len() as u64, Relaxed);
+        gpu.queue.write_texture(
+            wgpu::TexelCopyTextureInfo { origin: wgpu::Origin3d { x, y, z }, ..self.raw.as_image_copy() },
+            bytes,
+            wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(bytes.len() as u32 / height),
+                rows_per_image: Some(height),
+            },
+            wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        );
+    }
 }
 
 impl Drop for Texture {
@@ -120,6 +135,8 @@ pub(crate) enum Slot {
     Volume,
     /// An array of two-dimensional textures that are filtered.
     Layers,
+    /// A two-dimensional texture that is not filtered.
+    Texels,
     /// A sampler that filters.
     Sampler,
 }
@@ -127,8 +144,8 @@ pub(crate) enum Slot {
 /// The layout of a group whose bindings are numbered from 0, for `stages`.
 pub(crate) fn layout(gpu: &Gpu, stages: wgpu::ShaderStages, slots: &[Slot]) -> wgpu::BindGroupLayout {
     let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
-    let texture = |view_dimension| wgpu::BindingType::Texture {
-        sample_type: wgpu::TextureSampleType::Float { filterable: true },
+    let texture = |view_dimension, filterable| wgpu::BindingType::Texture {
+        sample_type: wgpu::TextureSampleType::Float { filterable },
         view_dimension,
         multisampled: false,
     };
@@ -141,8 +158,9 @@ pub(crate) fn layout(gpu: &Gpu, stages: wgpu::ShaderStages, slots: &[Slot]) -> w
                 Slot::Uniform => buffer(wgpu::BufferBindingType::Uniform),
                 Slot::Read => buffer(wgpu::BufferBindingType::Storage { read_only: true }),
                 Slot::Write => buffer(wgpu::BufferBindingType::Storage { read_only: false }),
-                Slot::Volume => texture(wgpu::TextureViewDimension::D3),
-                Slot::Layers => texture(wgpu::TextureViewDimension::D2Array),
+                Slot::Volume => texture(wgpu::TextureViewDimension::D3, true),
+                Slot::Layers => texture(wgpu::TextureViewDimension::D2Array, true),
+                Slot::Texels => texture(wgpu::TextureViewDimension::D2, false),
                 Slot::Sampler => wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
             },
             count: None,
@@ -197,15 +215,21 @@ pub(crate) fn compute(
     })
 }
 
-/// A pipeline of the entry points "vertex" and "fragment" that draws triangles onto one picture, but for those `culled`.
+/// A pipeline of the entry points "vertex" and "fragment" that draws triangles of vertices with these `attributes`, each `stride` bytes
+/// apart in every binding, onto one picture, but for those `culled`.
 pub(crate) fn render(
     gpu: &Gpu,
     module: &wgpu::ShaderModule,
     layout: &wgpu::PipelineLayout,
+    (stride, attributes): (u64, &[Vec<wgpu::VertexAttribute>]),
     format: wgpu::TextureFormat,
     blend: wgpu::BlendComponent,
     culled: Option<wgpu::Face>,
 ) -> wgpu::RenderPipeline {
+    let binding = |attributes| {
+        Some(wgpu::VertexBufferLayout { array_stride: stride, step_mode: wgpu::VertexStepMode::Vertex, attributes })
+    };
+    let buffers: Vec<_> = attributes.iter().map(|a| binding(a.as_slice())).collect();
     gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some("draw"),
         layout: Some(layout),
@@ -213,7 +237,7 @@ pub(crate) fn render(
             module,
             entry_point: Some("vertex"),
             compilation_options: Default::default(),
-            buffers: &[],
+            buffers: &buffers,
         },
         primitive: wgpu::PrimitiveState { cull_mode: culled, ..Default::default() },
         depth_stencil: None,

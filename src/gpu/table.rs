@@ -10,7 +10,6 @@ use crate::integral::lookup::{Range, Stored};
 use crate::integral::table::{Cylindrical, Kind, length};
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
-use std::sync::atomic::Ordering::Relaxed;
 use wgpu::{BufferUsages as Usage, TextureDimension, TextureFormat, TextureUsages};
 
 pub(crate) const TABLE: &str = include_str!("../../shaders/table.wgsl");
@@ -225,8 +224,8 @@ impl Writer<'_> {
     fn write(
         &mut self,
         texture: &Texture,
-        [x, y, z]: [u32; 3],
-        [width, height]: [u32; 2],
+        at: [u32; 3],
+        size: [u32; 2],
         texels: &[[f32; 4]],
         range: &Range,
     ) -> Result<()> {
@@ -237,17 +236,7 @@ impl Writer<'_> {
             _ => shares().map(|v| (v * 255.0).round() as u8).collect(),
         };
         let gpu = self.gpu;
-        gpu.uploaded.fetch_add(bytes.len() as u64, Relaxed);
-        gpu.queue.write_texture(
-            wgpu::TexelCopyTextureInfo { origin: wgpu::Origin3d { x, y, z }, ..texture.raw.as_image_copy() },
-            &bytes,
-            wgpu::TexelCopyBufferLayout {
-                offset: 0,
-                bytes_per_row: Some(width * self.format.block_copy_size(None).unwrap_or(16)),
-                rows_per_image: Some(height),
-            },
-            wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-        );
+        texture.write(gpu, at, size, &bytes);
         self.pending += bytes.len() as u64;
         if self.pending >= AT_ONCE {
             self.pending = 0;

@@ -5,15 +5,18 @@
 //! 3. Batch by batch, in that order, `project` (compute) makes a record of each cell, and the records are drawn.
 
 use super::frame::{FAR, FILLED, Frame, Limits, Seen, filled};
+use super::record::Layout;
 use super::{Compositing, Counts, Fragments, Order, Switches, Target, Thickness};
 use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Values};
 use crate::gpu::buffers::{Buffer, Chunks};
+use crate::gpu::clock::{CLOCKS, Clock};
+use crate::gpu::function::{self, LINES_ACROSS};
 use crate::gpu::raster::{self, Readback, Slot, Texture};
 use crate::gpu::shader::{self, Array, Variant};
 use crate::gpu::sort::Sorter;
 use crate::gpu::table::{self, TABLE};
-use crate::gpu::{DeviceChoice, Gpu, Part, arrays, function};
+use crate::gpu::{DeviceChoice, Gpu, Part, arrays};
 use crate::integral::{Exact, Lookup};
 use crate::order::depth::{self, HIDDEN, IN_PARTS};
 use crate::view::{Blend, View};
@@ -59,10 +62,6 @@ const GROWTH: f64 = 1.0 / 256.0;
 /// Loop iterations of a fragment that llvmpipe surely makes: see `traverse::gpu`.
 const MOST_WORK: u32 = 8000;
 
-/// Vertices and triangles' corners of a record, for each form.
-const INTERSECTED_INDICES: (u32, &[u32]) = (4, &[0, 1, 2, 0, 2, 3]);
-const INTERPOLATED_INDICES: (u32, &[u32]) = (5, &[4, 0, 1, 4, 1, 2, 4, 2, 3, 4, 3, 0]);
-
 /// `Part` in the shaders.
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
 #[repr(C)]
@@ -81,15 +80,18 @@ struct Program {
     source: String,
     format: wgpu::TextureFormat,
     compositing: Compositing,
+    layout: Layout,
     arrays: wgpu::BindGroupLayout,
     classify: wgpu::ComputePipeline,
     project: wgpu::ComputePipeline,
     draw: wgpu::RenderPipeline,
 }
 
-/// What a frame's batches are drawn with and into; depends on the form and the size of the picture.
+/// What a frame's batches are drawn with and into.
 struct Canvas {
-    corners: usize,
+    layout: Layout,
+    size: [u32; 2],
+    format: wgpu::TextureFormat,
     records: Buffer,
     indices: Buffer,
     picture: Texture,
@@ -108,18 +110,25 @@ struct Ordered {
     chunks: Vec<Buffer>,
 }
 
+/// The transfer function on the device.
+struct HeldFunction {
+    buffers: [Buffer; 3],
+    lines: Texture,
+    /// See [`filled`].
+    filled: Buffer,
+}
+
 /// A device, and what of the mesh, field and function it holds.
 pub(crate) struct Project {
     gpu: Gpu,
     shared: wgpu::BindGroupLayout,
     own: wgpu::BindGroupLayout,
-    drawn: wgpu::BindGroupLayout,
     cells: Option<Chunks>,
     points: Option<Chunks>,
     values: Option<Chunks>,
-    function: Option<([Buffer; 3], Buffer)>,
+    function: Option<HeldFunction>,
     program: Option<Program>,
-    canvas: Option<(Fragments, [u32; 2], wgpu::TextureFormat, u64, Canvas)>,
+    canvas: Option<Canvas>,
     ordered: Option<Ordered>,
     table: table::Held,
     sorter: Option<Sorter>,
@@ -159,15 +168,13 @@ impl Project {
         let shared = raster::layout(
             &gpu,
             Stages::COMPUTE | Stages::VERTEX_FRAGMENT,
-            &[&[Uniform, Read, Read, Uniform, Read, Read], &table::SLOTS[..]].concat(),
+            &[&[Uniform, Read, Read, Uniform, Read, Read], &table::SLOTS[..], &[Slot::Texels]].concat(),
         );
         let own = raster::layout(&gpu, Stages::COMPUTE, &[Uniform, Read, Write, Read, Write]);
-        let drawn = raster::layout(&gpu, Stages::VERTEX_FRAGMENT, &[Read]);
         Ok(Project {
             gpu,
             shared,
             own,
-            drawn,
             cells: None,
             points: None,
             values: None,
@@ -215,8 +222,11 @@ impl Project {
             self.values = Some(arrays::values(gpu, values)?);
         }
         if self.function.is_none() {
-            let filled = Buffer::holding(gpu, "filled", &filled(exact), Usage::STORAGE)?;
-            self.function = Some((function::upload(gpu, exact)?, filled));
+            self.function = Some(HeldFunction {
+                buffers: function::upload(gpu, exact)?,
+                lines: function::lines(gpu, exact)?,
+                filled: Buffer::holding(gpu, "filled", &filled(exact), Usage::STORAGE)?,
+            });
         }
         Ok(())
     }
@@ -250,9 +260,10 @@ impl Project {
         // In parallel views all segments of a cell are on one plane.
         let one_plane = table.is_some_and(|t| t.choice().per_cell) || view.eye().is_none();
         limits.plane_per_cell = one_plane && switches.fragments != Fragments::Intersected;
-        let source = program(&variant, association, switches, table.map(|t| &**t), limits, &arrays);
-        self.compile(&arrays, source, switches, format)?;
-        self.prepare_canvas::<N>(switches.fragments, view.size(), format)?;
+        let layout = Layout::new(switches.fragments, N);
+        let source = program(&variant, association, switches, &layout, table.map(|t| &**t), limits, &arrays);
+        self.prepare_canvas(&layout, view.size(), format)?;
+        self.compile(&arrays, source, switches, layout, format)?;
         let frame = Pass::new(self, &seen)?;
         let mut counts = Counts::default();
         if !self.ordered.as_ref().is_some_and(|o| o.holds_for(&seen, switches)) {
@@ -302,6 +313,7 @@ impl Project {
         arrays: &[Array],
         source: String,
         switches: &Switches,
+        layout: Layout,
         format: wgpu::TextureFormat,
     ) -> Result<()> {
         let compositing = switches.compositing;
@@ -314,7 +326,7 @@ impl Project {
         let array_layout = raster::layout(gpu, Stages::COMPUTE, &vec![Slot::Read; bindings]);
         let module = raster::module(gpu, "project", &source);
         let cells = raster::pipeline_layout(gpu, &[Some(&self.shared), Some(&array_layout), Some(&self.own)]);
-        let drawing = raster::pipeline_layout(gpu, &[Some(&self.shared), None, None, Some(&self.drawn)]);
+        let drawing = raster::pipeline_layout(gpu, &[Some(&self.shared)]);
         let blend = wgpu::BlendComponent {
             src_factor: wgpu::BlendFactor::One,
             dst_factor: match compositing {
@@ -328,7 +340,16 @@ impl Project {
         let program = Program {
             classify: raster::compute(gpu, &module, "classify", &cells),
             project: raster::compute(gpu, &module, "project_all", &cells),
-            draw: raster::render(gpu, &module, &drawing, format, blend, culled),
+            draw: raster::render(
+                gpu,
+                &module,
+                &drawing,
+                (layout.part_bytes(), &layout.attributes()),
+                format,
+                blend,
+                culled,
+            ),
+            layout,
             arrays: array_layout,
             source,
             format,
@@ -339,24 +360,18 @@ impl Project {
         Ok(())
     }
 
-    fn prepare_canvas<const N: usize>(
-        &mut self,
-        form: Fragments,
-        size: [u32; 2],
-        format: wgpu::TextureFormat,
-    ) -> Result<()> {
-        let stride = stride::<N>(form);
-        if self.canvas.as_ref().is_some_and(|c| (c.0, c.1, c.2, c.3) == (form, size, format, stride)) {
+    fn prepare_canvas(&mut self, layout: &Layout, size: [u32; 2], format: wgpu::TextureFormat) -> Result<()> {
+        if self.canvas.as_ref().is_some_and(|c| (&c.layout, c.size, c.format) == (layout, size, format)) {
             return Ok(());
         }
         self.canvas = None;
         let gpu = &self.gpu;
-        let (vertices, corners) = indices(form);
-        let all: Vec<u32> = (0..BATCH as u32).flat_map(|r| corners.iter().map(move |c| r * vertices + c)).collect();
+        let Layout { triangles, parts, .. } = *layout;
+        let all: Vec<u32> = (0..BATCH as u32).flat_map(|r| triangles.iter().map(move |c| r * parts + c)).collect();
         let [w, h] = size;
         let canvas = Canvas {
-            corners: corners.len(),
-            records: Buffer::new(gpu, "records", stride * BATCH as u64, Usage::STORAGE)?,
+            // One more, as the last one's vertices look for words beyond it.
+            records: Buffer::new(gpu, "records", layout.bytes() * (BATCH as u64 + 1), Usage::STORAGE | Usage::VERTEX)?,
             indices: Buffer::holding(gpu, "indices", &all, Usage::INDEX)?,
             picture: Texture::new(
                 gpu,
@@ -367,8 +382,11 @@ impl Project {
                 TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC,
             )?,
             back: Readback::new(gpu, u64::from(row_bytes(w, format)) * u64::from(h) + 16 * u64::from(CLOCKS))?,
+            layout: layout.clone(),
+            size,
+            format,
         };
-        self.canvas = Some((form, size, format, stride, canvas));
+        self.canvas = Some(canvas);
         Ok(())
     }
 
@@ -467,11 +485,10 @@ impl Project {
     /// Projects and draws all batches.
     fn draw(&self, frame: &Pass, view: &View, counts: &mut Counts) -> Result<Vec<[f32; 4]>> {
         let gpu = &self.gpu;
-        let (Some(program), Some((_, _, format, _, canvas)), Some(ordered)) =
-            (&self.program, &self.canvas, &self.ordered)
-        else {
+        let (Some(program), Some(canvas), Some(ordered)) = (&self.program, &self.canvas, &self.ordered) else {
             return Err(unprepared());
         };
+        let format = canvas.format;
         counts.records = ordered.entries as u64;
         // Each batch's slice at its own offset, as uniforms are aligned.
         let step = gpu.device.limits().min_uniform_buffer_offset_alignment.max(size_of::<Slice>() as u32) as usize;
@@ -486,7 +503,6 @@ impl Project {
         }
         let slices = Buffer::holding(gpu, "slices", &slices, Usage::UNIFORM)?;
         let none = Buffer::new(gpu, "none", 16, Usage::STORAGE)?;
-        let drawn = raster::group(gpu, &self.drawn, [canvas.records.raw.as_entire_binding()]);
         let clock = Clock::new(gpu)?;
 
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
@@ -531,13 +547,16 @@ impl Project {
                 });
                 pass.set_pipeline(&program.draw);
                 pass.set_bind_group(0, &frame.shared, &[]);
-                pass.set_bind_group(3, &drawn, &[]);
+                for part in 0..program.layout.parts {
+                    let from = u64::from(part) * program.layout.part_bytes();
+                    pass.set_vertex_buffer(part, canvas.records.raw.slice(from..));
+                }
                 pass.set_index_buffer(canvas.indices.raw.slice(..), wgpu::IndexFormat::Uint32);
                 let counter = clock.as_ref().and_then(|c| c.fragments.as_ref()).filter(|_| i < CLOCKS as usize / 4);
                 if let Some(counter) = counter {
                     pass.begin_pipeline_statistics_query(counter, i as u32);
                 }
-                pass.draw_indexed(0..(count * canvas.corners) as u32, 0, 0..1);
+                pass.draw_indexed(0..(count * program.layout.triangles.len()) as u32, 0, 0..1);
                 if counter.is_some() {
                     pass.end_pipeline_statistics_query();
                 }
@@ -556,7 +575,7 @@ impl Project {
             (counts.project_ms, counts.draw_ms) = (Some(project_ms), Some(all - project_ms));
         }
         let [w, h] = view.size();
-        let row = row_bytes(w, *format);
+        let row = row_bytes(w, format);
         let picture_bytes = u64::from(row) * u64::from(h);
         encoder.copy_texture_to_buffer(
             canvas.picture.raw.as_image_copy(),
@@ -584,10 +603,7 @@ impl Project {
                     (counts.project_ms, counts.draw_ms) = (Some(sum(0)), Some(sum(2)));
                 }
             }
-            picture
-                .chunks(row as usize)
-                .flat_map(|line| pixels(&line[..w as usize * texel(*format)], *format))
-                .collect()
+            picture.chunks(row as usize).flat_map(|line| pixels(&line[..w as usize * texel(format)], format)).collect()
         })
     }
 
@@ -621,7 +637,7 @@ impl FilledBinding {
 impl Pass {
     fn new(project: &Project, seen: &Seen) -> Result<Self> {
         let gpu = &project.gpu;
-        let (Some((function, filled)), Some(program), Some(table)) =
+        let (Some(HeldFunction { buffers: function, lines, filled }), Some(program), Some(table)) =
             (&project.function, &project.program, project.table.get())
         else {
             return Err(unprepared());
@@ -632,6 +648,7 @@ impl Pass {
             Buffer::holding(gpu, "ends", &seen.ends, Usage::STORAGE)?,
         ];
         let shared = function.iter().chain(&buffers).map(|b| b.raw.as_entire_binding()).chain(table.bindings());
+        let shared = shared.chain([wgpu::BindingResource::TextureView(&lines.view)]);
         let arrays = project.chunks()?.into_iter().flat_map(|c| &c.buffers).map(|b| b.raw.as_entire_binding());
         Ok(Pass {
             shared: raster::group(gpu, &project.shared, shared),
@@ -656,63 +673,6 @@ fn unprepared() -> Error {
     Error::Render("the device is not prepared for a frame".into())
 }
 
-/// Timestamps of a frame at most.
-const CLOCKS: u32 = 1024;
-
-/// Measures the passes of the first batches, and counts their fragments, where the device can.
-struct Clock {
-    queries: wgpu::QuerySet,
-    fragments: Option<wgpu::QuerySet>,
-    resolved: Buffer,
-}
-
-impl Clock {
-    fn new(gpu: &Gpu) -> Result<Option<Self>> {
-        if !gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
-            return Ok(None);
-        }
-        let descriptor = wgpu::QuerySetDescriptor { label: None, ty: wgpu::QueryType::Timestamp, count: CLOCKS };
-        let queries = gpu.device.create_query_set(&descriptor);
-        let usage = Usage::QUERY_RESOLVE | Usage::COPY_SRC;
-        let count = wgpu::QuerySetDescriptor {
-            label: None,
-            ty: wgpu::QueryType::PipelineStatistics(wgpu::PipelineStatisticsTypes::FRAGMENT_SHADER_INVOCATIONS),
-            count: CLOCKS / 4,
-        };
-        let counts = gpu.device.features().contains(wgpu::Features::PIPELINE_STATISTICS_QUERY);
-        let fragments = counts.then(|| gpu.device.create_query_set(&count));
-        let resolved = Buffer::new(gpu, "clock", 16 * u64::from(CLOCKS), usage)?;
-        Ok(Some(Clock { queries, fragments, resolved }))
-    }
-
-    fn compute(&self, batch: usize) -> Option<wgpu::ComputePassTimestampWrites<'_>> {
-        let first = 4 * batch as u32;
-        (first + 4 <= CLOCKS).then_some(wgpu::ComputePassTimestampWrites {
-            query_set: &self.queries,
-            beginning_of_pass_write_index: Some(first),
-            end_of_pass_write_index: Some(first + 1),
-        })
-    }
-
-    fn render(&self, batch: usize) -> Option<wgpu::RenderPassTimestampWrites<'_>> {
-        let first = 4 * batch as u32 + 2;
-        (first + 2 <= CLOCKS).then_some(wgpu::RenderPassTimestampWrites {
-            query_set: &self.queries,
-            beginning_of_pass_write_index: Some(first),
-            end_of_pass_write_index: Some(first + 1),
-        })
-    }
-
-    fn resolve(&self, encoder: &mut wgpu::CommandEncoder, into: &wgpu::Buffer, offset: u64, batches: usize) {
-        let half = 8 * u64::from(CLOCKS);
-        encoder.resolve_query_set(&self.queries, 0..4 * batches as u32, &self.resolved.raw, 0);
-        if let Some(fragments) = &self.fragments {
-            encoder.resolve_query_set(fragments, 0..batches as u32, &self.resolved.raw, half);
-        }
-        encoder.copy_buffer_to_buffer(&self.resolved.raw, 0, into, offset, 2 * half);
-    }
-}
-
 fn attachment(texture: &Texture, load: wgpu::LoadOp<wgpu::Color>) -> wgpu::RenderPassColorAttachment<'_> {
     wgpu::RenderPassColorAttachment {
         view: &texture.view,
@@ -727,21 +687,6 @@ fn groups_of(count: usize) -> (u32, [u32; 2]) {
     let groups = (count as u32).div_ceil(GROUP).max(1);
     let across = groups.min(MOST_GROUPS);
     (across * GROUP, [across, groups.div_ceil(across)])
-}
-
-fn indices(form: Fragments) -> (u32, &'static [u32]) {
-    if form == Fragments::Intersected { INTERSECTED_INDICES } else { INTERPOLATED_INDICES }
-}
-
-/// Bytes of a record: `Record` in the shaders.
-fn stride<const N: usize>(form: Fragments) -> u64 {
-    let values = 4 * N as u64;
-    let align = if N == 4 || form == Fragments::Intersected { 16 } else { 8 };
-    let bytes = match form {
-        Fragments::Intersected => 128 + 6 * values,
-        Fragments::Interpolated | Fragments::Linear => 88u64.next_multiple_of(align) + 8 * values,
-    };
-    bytes.next_multiple_of(align)
 }
 
 fn texel(format: wgpu::TextureFormat) -> usize {
@@ -774,6 +719,7 @@ fn program(
     variant: &Variant,
     association: &str,
     switches: &Switches,
+    layout: &Layout,
     table: Option<&Lookup>,
     limits: Limits,
     arrays: &[Array],
@@ -787,7 +733,6 @@ fn program(
         Fragments::Interpolated => "INTERPOLATED",
         Fragments::Linear => "LINEAR",
     };
-    let corners = indices(switches.fragments).0;
     for (name, value) in [
         ("BY_DEPTH", switches.thickness == Thickness::Depth),
         ("DITHERED", switches.dither && switches.target == Target::Rgba8),
@@ -799,12 +744,13 @@ fn program(
         text += &format!("const {name} = {value};\n");
     }
     text += &format!(
-        "const HIDDEN = {HIDDEN}u;\nconst IN_PARTS = {IN_PARTS}u;\nconst FILLED = {FILLED}u;\nconst MOST_WORK = {MOST_WORK}u;\n\
-         const INTERSECTED = 0u;\nconst INTERPOLATED = 1u;\nconst LINEAR = 2u;\nconst FORM = {form};\nconst CORNERS = {corners}u;\n\
+        "const LINES_ACROSS = {LINES_ACROSS}u;\nconst HIDDEN = {HIDDEN}u;\nconst IN_PARTS = {IN_PARTS}u;\nconst FILLED = {FILLED}u;\nconst MOST_WORK = {MOST_WORK}u;\n\
+         const INTERSECTED = 0u;\nconst INTERPOLATED = 1u;\nconst LINEAR = 2u;\nconst FORM = {form};\n\
          const POINT = 0u;\nconst CORNER = 1u;\nconst CELL = 2u;\nconst ASSOCIATION = {association};\n"
     );
     text += arrays::POINT;
     let [records, drawing] = if form == "INTERSECTED" { INTERSECTED } else { INTERPOLATED };
+    text += &layout.wgsl();
     text += &shader::accessors(arrays);
     text += &table::constants(table, limits.plane_per_cell);
     text += &table::declarations(0, 6);

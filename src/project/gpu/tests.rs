@@ -19,6 +19,10 @@ fn arrays(chunks: usize) -> Vec<Array> {
 const KINDS: [Kind; 3] = [Kind::Scalar, Kind::Pair, Kind::Rgba];
 const FORMS: [Fragments; 3] = [Fragments::Intersected, Fragments::Interpolated, Fragments::Linear];
 
+fn components(kind: Kind) -> usize {
+    [1, 2, 4][KINDS.iter().position(|&k| k == kind).unwrap()]
+}
+
 #[test]
 fn every_program_is_valid() {
     for kind in KINDS {
@@ -42,7 +46,8 @@ fn every_program_is_valid() {
                     };
                     let variant = Variant { kind, direct };
                     let arrays = arrays(chunks);
-                    validated(&program(&variant, association, &switches, table.as_ref(), limits, &arrays));
+                    let layout = Layout::new(fragments, components(kind));
+                    validated(&program(&variant, association, &switches, &layout, table.as_ref(), limits, &arrays));
                 }
             }
         }
@@ -51,36 +56,42 @@ fn every_program_is_valid() {
 
 #[test]
 fn layouts_match_their_rust_twins() {
-    for (kind, components) in KINDS.into_iter().zip([1, 2, 4]) {
+    for kind in KINDS {
         for fragments in FORMS {
+            let layout = Layout::new(fragments, components(kind));
             let switches = Switches { fragments, ..Switches::default() };
             let module = validated(&program(
                 &Variant { kind, direct: false },
                 "POINT",
                 &switches,
+                &layout,
                 None,
                 Limits::default(),
                 &arrays(1),
             ));
-            let span = |name: &str| {
+            let members = |name: &str| {
                 let (_, t) = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name)).unwrap();
-                let naga::TypeInner::Struct { span, .. } = &t.inner else { panic!("{name} is no struct") };
-                u64::from(*span)
-            };
-            let record = match components {
-                1 => stride::<1>(fragments),
-                2 => stride::<2>(fragments),
-                _ => stride::<4>(fragments),
+                let naga::TypeInner::Struct { span, members } = &t.inner else { panic!("{name} is no struct") };
+                let at = |m: &naga::StructMember| (m.name.clone().unwrap(), u64::from(m.offset));
+                (u64::from(*span), members.iter().map(at).collect::<Vec<_>>())
             };
             let rust = [
-                ("Record", record),
+                ("Record", layout.bytes()),
+                ("Vertex", layout.part_bytes()),
                 ("Frame", size_of::<Frame>() as u64),
                 ("Part", size_of::<Slice>() as u64),
                 ("Point", 24),
             ];
             for (name, size) in rust {
-                assert_eq!(span(name), size, "{name}, {kind:?}, {fragments:?}");
+                assert_eq!(members(name).0, size, "{name}, {kind:?}, {fragments:?}");
             }
+            let (_, vertex) = members("Vertex");
+            let attributes = layout.attributes();
+            for (location, (name, offset)) in vertex.iter().enumerate() {
+                assert_eq!(attributes[0][location].offset, *offset, "{name}, {kind:?}, {fragments:?}");
+            }
+            let locations: Vec<_> = attributes.iter().flatten().map(|a| a.shader_location as usize).collect();
+            assert!(locations.len() <= 16 && locations.iter().copied().eq(0..locations.len()), "{locations:?}");
         }
     }
 }

@@ -1,0 +1,155 @@
+//! Records: what is drawn of each cell, as the compute stage writes it and the rasteriser's vertex stage reads it.
+//!
+//! A record has an equal part for each vertex of its triangles: what differs between vertices, and a share of the *words* that all
+//! fragments of the cell need. The vertex buffer is bound once for each part, moved by as much, so that a record's first vertex finds all
+//! words, of which triangles take the first vertex's; the others find something that nobody looks at. Vertex fetch is much
+//! faster than look-ups in a storage buffer where drivers do these lane by lane.
+
+use super::Fragments;
+
+/// The words of a form before its values, and how many values there are.
+const INTERSECTED: (usize, usize) = (8, 6);
+const INTERPOLATED: (usize, usize) = (4, 2);
+
+/// A float, two or four.
+fn type_of(floats: usize) -> &'static str {
+    ["", "f32", "vec2f", "", "vec4f"][floats]
+}
+
+/// The record of a form for fields of so many components.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Layout {
+    /// Its triangles; the first corner of each is the first vertex's part.
+    pub(crate) triangles: &'static [u32],
+    pub(crate) parts: u32,
+    /// What each vertex has: name, floats, and where, in bytes.
+    own: Vec<(&'static str, usize, u64)>,
+    /// Words of four floats; of each part; and where they begin in it, in bytes.
+    words: usize,
+    share: usize,
+    words_at: u64,
+    components: usize,
+    /// The first word with values, and the number of values.
+    values: (usize, usize),
+}
+
+impl Layout {
+    pub(crate) fn new(form: Fragments, components: usize) -> Self {
+        let is_intersected = form == Fragments::Intersected;
+        let own = match is_intersected {
+            true => vec![("corner", 2)],
+            false => vec![("corner", 2), ("front", components), ("back", components), ("depths", 4)],
+        };
+        let (triangles, values): (&[u32], _) = match is_intersected {
+            true => (&[0, 1, 2, 0, 2, 3], INTERSECTED),
+            false => (&[0, 1, 2, 0, 2, 3, 0, 3, 4, 0, 4, 1], INTERPOLATED),
+        };
+        let parts = triangles.iter().fold(0, |n, &i| n.max(i + 1));
+        let words = values.0 + (values.1 * components).div_ceil(4);
+        let mut end = 0;
+        let place = |(name, floats): (&'static str, usize)| {
+            let bytes = 4 * floats as u64;
+            let at = u64::next_multiple_of(end, bytes);
+            end = at + bytes;
+            (name, floats, at)
+        };
+        let own: Vec<_> = own.into_iter().map(place).collect();
+        let share = words.div_ceil(parts as usize);
+        Layout { triangles, parts, own, words, share, words_at: end.next_multiple_of(16), components, values }
+    }
+
+    /// Bytes of a part, and of a record.
+    pub(crate) fn part_bytes(&self) -> u64 {
+        self.words_at + 16 * self.share as u64
+    }
+
+    pub(crate) fn bytes(&self) -> u64 {
+        self.part_bytes() * u64::from(self.parts)
+    }
+
+    /// The attributes of each binding of the vertex buffer.
+    pub(crate) fn attributes(&self) -> Vec<Vec<wgpu::VertexAttribute>> {
+        let own = self.own.iter().zip(0..).map(|(&(_, floats, offset), shader_location)| {
+            let format = match floats {
+                1 => wgpu::VertexFormat::Float32,
+                2 => wgpu::VertexFormat::Float32x2,
+                _ => wgpu::VertexFormat::Float32x4,
+            };
+            wgpu::VertexAttribute { format, offset, shader_location }
+        });
+        let word = |i: usize| wgpu::VertexAttribute {
+            format: wgpu::VertexFormat::Float32x4,
+            offset: self.words_at + 16 * (i % self.share) as u64,
+            shader_location: (self.own.len() + i) as u32,
+        };
+        let words: Vec<_> = (0..self.words).map(word).collect();
+        let mut parts: Vec<_> = words.chunks(self.share).map(<[_]>::to_vec).collect();
+        if let Some(first) = parts.first_mut() {
+            first.splice(0..0, own);
+        }
+        parts
+    }
+
+    /// `Record` and `store`, which fills its words; `Stored`, which is what a vertex finds of it, and `Drawn`, which it hands on to
+    /// fragments; and what fragments take out of that again.
+    pub(crate) fn wgsl(&self) -> String {
+        let Layout { parts, words, share, values: (first, count), components, .. } = *self;
+        let own = |each: &dyn Fn(usize, &str) -> String, skipped: usize| {
+            let own = self.own.iter().enumerate().skip(skipped);
+            own.map(|(i, (name, floats, _))| each(i, &format!("{name}: {}, ", type_of(*floats)))).collect::<String>()
+        };
+        let each = |of: &dyn Fn(usize) -> String| (0..words).map(of).collect::<String>();
+        let at = self.own.len();
+
+        // Values are packed tightly into words.
+        let float = |i: usize| format!("[{}].{}", i / 4, ["x", "y", "z", "w"][i % 4]);
+        let packed = |i: usize| match i {
+            _ if i >= count * components => "0.0".into(),
+            _ if components == 1 => format!("v[{i}]"),
+            _ => format!("v[{}].{}", i / components, ["x", "y", "z", "w"][i % components]),
+        };
+        let word = |i: usize| match i.checked_sub(first) {
+            None => format!("words[{i}]"),
+            Some(k) => format!("vec4f({})", (4 * k..4 * k + 4).map(packed).collect::<Vec<_>>().join(", ")),
+        };
+        let value = |i: usize| {
+            let floats = i * components..(i + 1) * components;
+            let floats: Vec<_> = floats.map(|f| format!("words{}", float(4 * first + f))).collect();
+            format!("Value({})", floats.join(", "))
+        };
+        let values: Vec<_> = (0..count).map(value).collect();
+
+        [
+            format!("alias Words = array<vec4f, {words}>;"),
+            format!("alias Values = array<Value, {count}>;"),
+            format!("struct Vertex {{ {}words: array<vec4f, {share}> }}", own(&|_, field| field.into(), 0)),
+            format!("struct Record {{ vertices: array<Vertex, {parts}> }}"),
+            format!(
+                "fn store(i: u32, words: array<vec4f, {first}>, v: Values) {{ {}}}",
+                each(&|w| format!("records[i].vertices[{}].words[{}] = {}; ", w / share, w % share, word(w)))
+            ),
+            format!(
+                "struct Stored {{ {}{}}}",
+                own(&|i, field| format!("@location({i}) {field}"), 0),
+                each(&|w| format!("@location({}) word_{w}: vec4f, ", at + w))
+            ),
+            format!(
+                "struct Drawn {{ @builtin(position) at: vec4f, {}{}}}",
+                own(&|i, field| format!("@location({}) {field}", i - 1), 1),
+                each(&|w| format!("@location({}) @interpolate(flat) word_{w}: vec4f, ", at - 1 + w))
+            ),
+            format!(
+                "fn drawn_at(at: vec4f, stored: Stored) -> Drawn {{ return Drawn(at, {}{}); }}",
+                self.own.iter().skip(1).map(|(name, ..)| format!("stored.{name}, ")).collect::<String>(),
+                each(&|w| format!("stored.word_{w}, "))
+            ),
+            format!(
+                "fn words_of(drawn: Drawn) -> Words {{ return Words({}); }}",
+                each(&|w| format!("drawn.word_{w}, "))
+            ),
+            format!("fn values_in(words: Words) -> Values {{ return Values({}); }}", values.join(", ")),
+            String::new(),
+        ]
+        .join("\n")
+    }
+}
