@@ -54,16 +54,24 @@ fn opacity_of_depth(d: f32) -> f32 {
     return 1.0 - exponential(-d);
 }
 
-/// One node's share of ∫ T′(u) e^{−T(u)} du, ∫ u T′(u) e^{−T(u)} du, ∫ e^{−T(u)} du and ∫ u e^{−T(u)} du, as far as they are asked for.
-fn node(x: f32, y: f32, start: f32, width: f32, at: vec2f) -> vec3f {
-    let u = start + width * at.x;
-    let rise = (y - x) * u;
-    let e = width * at.y * exponential(-(x + rise * 0.5) * u);
-    let absorbed = (x + rise) * e;
+/// Opacity of a piece of optical depths `x` and `y` up to MILD, and the weights of its emission, both ends together and the back alone:
+/// see `Piece::mild` in src/integral.rs.
+fn mild(x: f32, y: f32) -> vec3f {
+    let depth = (x + y) * 0.5;
+    let rise = y - x;
+    let square = depth * depth;
+    let h = depth * 0.5;
+    let q = h * (1.0 - h * (1.0 / 2.0 - h * (1.0 / 6.0 - h * (1.0 / 24.0 - h * (1.0 / 120.0 - h * (1.0 / 720.0 - h * (1.0 / 5040.0 - h * (1.0 / 40320.0))))))));
+    let even = square * (1.0 / 24.0 + square * (1.0 / 1920.0 + square * (1.0 / 322560.0)));
+    let bent = (1.0 / 12.0 + square * (1.0 / 480.0 + square * (1.0 / 53760.0)))
+        + rise * ((1.0 / 240.0 + square * (1.0 / 13440.0)) + rise * ((1.0 / 6720.0 + square * (1.0 / 483840.0)) + rise * (1.0 / 241920.0)));
+    let e = 1.0 - q;
+    let alpha = e * depth * (1.0 + even);
     if DIRECT {
-        return vec3f(absorbed, e, u * e);
+        let seen = 1.0 + even + rise * bent;
+        return vec3f(alpha, e * seen, e * (0.5 * seen - depth * bent));
     }
-    return vec3f(absorbed, u * absorbed, 0.0);
+    return vec3f(alpha, alpha, e * (q + even + rise * bent));
 }
 
 /// What a piece of optical depths `x` and `y` does: its opacity and the weights of the emission at its two ends.
@@ -73,31 +81,24 @@ fn piece(x: f32, y: f32) -> vec3f {
     if x + y > 2.0 * DEEP {
         end = min(2.0 * DEEP / (x + sqrt(max(x * x + 2.0 * DEEP * (y - x), 0.0))), 1.0);
     }
-    // Three nodes at a time: all of a shallow piece, or half a panel's. So drivers that take both ways of every decision
-    // compute no more than three for most pieces.
-    let is_shallow = max(x, y) <= SHALLOW;
-    let panels = f32(u32(min(max(x, x + (y - x) * end) * end / PANEL, 64.0))) + 1.0;
-    let width = end / panels;
+    let steps = f32(u32(min(max(x, x + (y - x) * end) * end * (1.0 / MILD), 64.0))) + 1.0;
+    let width = end / steps;
     var start = 0.0;
-    var second = false;
+    var through = 1.0;
     var sum = vec3f();
     loop {
-        sum += node(x, y, start, width, select(select(GAUSS_6_0, GAUSS_6_3, second), GAUSS_3_0, is_shallow));
-        sum += node(x, y, start, width, select(select(GAUSS_6_1, GAUSS_6_4, second), GAUSS_3_1, is_shallow));
-        sum += node(x, y, start, width, select(select(GAUSS_6_2, GAUSS_6_5, second), GAUSS_3_2, is_shallow));
-        start = select(start, start + width, second);
-        second = !second;
+        let first = (x + (y - x) * start) * width;
+        let p = mild(first, first + (y - x) * width * width);
+        sum += through * vec3f(p.x, select(1.0, width, DIRECT) * vec2f(p.y, start * p.y + width * p.z));
+        through -= through * p.x;
+        start += width;
         work++;
-        if is_shallow || start > end - 0.5 * width {
+        if start > end - 0.5 * width {
             break;
         }
     }
-    let alpha = select(sum.x, 1.0 - exponential(-(x + y) * 0.5), max(x, y) > PANEL);
-    if DIRECT {
-        return vec3f(alpha, sum.y - sum.z, sum.z);
-    }
-    let beta = min(sum.y, alpha);
-    return vec3f(alpha, alpha - beta, beta);
+    let back = min(sum.z, sum.y);
+    return vec3f(sum.x, sum.y - back, back);
 }
 
 fn track(first: u32, last: u32, bucket: u32, front: f32, back: f32) -> Track {

@@ -2,7 +2,7 @@
 
 use super::Gpu;
 use crate::field::Kind;
-use crate::integral::{BUCKETS, DEEP, GAUSS_3, GAUSS_6, OPAQUE_EXTINCTION, PANEL, SHALLOW};
+use crate::integral::{BUCKETS, DEEP, MILD, OPAQUE_EXTINCTION};
 use std::fmt::Write;
 
 pub(crate) const CELL: &str = include_str!("../../shaders/cell.wgsl");
@@ -32,18 +32,13 @@ pub(crate) fn prelude(variant: &Variant) -> String {
     let mut text = String::new();
     let number = |x: f64| format!("{x:?}f");
     let mut constant = |name: &str, value: String| text += &format!("const {name} = {value};\n");
-    for (name, value) in [("DEEP", DEEP), ("SHALLOW", SHALLOW), ("PANEL", PANEL), ("OPAQUE", OPAQUE_EXTINCTION)] {
+    for (name, value) in [("DEEP", DEEP), ("MILD", MILD), ("OPAQUE", OPAQUE_EXTINCTION)] {
         constant(name, number(value));
     }
     // Four units in the last place, as in cell.rs; and what is as good as 0 but far above the smallest f32.
     constant("DOUBT", number(4.0 * f64::from(f32::EPSILON)));
     constant("TINY", number(1e-18));
     constant("BUCKETS", format!("{BUCKETS}u"));
-    for (rule, nodes) in [("GAUSS_3", &GAUSS_3[..]), ("GAUSS_6", &GAUSS_6)] {
-        for (i, [node, weight]) in nodes.iter().enumerate() {
-            constant(&format!("{rule}_{i}"), format!("vec2f({node:?}, {weight:?})"));
-        }
-    }
     constant("DIRECT", variant.direct.to_string());
     constant("PAIR", (variant.kind == Kind::Pair).to_string());
     constant("RGBA", (variant.kind == Kind::Rgba).to_string());

@@ -1,6 +1,6 @@
 //! Many pieces at a time: the same arithmetic as [`Piece::new`], in vector instructions.
 
-use super::{Exact, Light, PANEL, Piece};
+use super::{Exact, Light, MILD, PANEL, Piece};
 
 /// Pieces that a [`Batch`] holds.
 const BATCH: usize = 32;
@@ -68,7 +68,13 @@ impl Batch {
         for (((front, back), length), (x, y)) in pieces.clone().zip(x.iter_mut().zip(&mut y)) {
             (*x, *y) = (front[0] * length, back[0] * length);
         }
-        let moderate = if direct { moderate::<true>(&x, &y, self.len) } else { moderate::<false>(&x, &y, self.len) };
+        let all_mild = x.iter().zip(&y).all(|(x, y)| x.max(*y) <= MILD as f32);
+        let moderate = match (all_mild, direct) {
+            (true, false) => many(&x, &y, self.len, |x, y| Piece::mild(x, y, false)),
+            (true, true) => many(&x, &y, self.len, |x, y| Piece::mild(x, y, true)),
+            (false, false) => many(&x, &y, self.len, |x, y| Piece::moderate(x, y, false)),
+            (false, true) => many(&x, &y, self.len, |x, y| Piece::moderate(x, y, true)),
+        };
         for (i, ((f, b), length)) in pieces.enumerate() {
             let piece = if x[i].max(y[i]) > PANEL as f32 {
                 Piece::new(x[i], y[i], direct)
@@ -82,13 +88,13 @@ impl Batch {
     }
 }
 
-/// α, front and back of [`Piece::moderate`] for the first `len` depths, and some more.
+/// α, front and back of the first `len` pieces, and some more.
 #[inline(always)]
-fn moderate<const DIRECT: bool>(x: &[f32; BATCH], y: &[f32; BATCH], len: usize) -> [[f32; BATCH]; 3] {
+fn many(x: &[f32; BATCH], y: &[f32; BATCH], len: usize, piece: impl Fn(f32, f32) -> Piece<f32>) -> [[f32; BATCH]; 3] {
     let [mut alpha, mut front, mut back] = [[0.0; BATCH]; 3];
     // Whole vectors, and never beyond the arrays, which is what the compiler must see.
     for i in 0..len.next_multiple_of(8).min(BATCH) {
-        let piece = Piece::moderate(x[i], y[i], DIRECT);
+        let piece = piece(x[i], y[i]);
         (alpha[i], front[i], back[i]) = (piece.alpha, piece.front, piece.back);
     }
     [alpha, front, back]
