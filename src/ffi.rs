@@ -286,7 +286,7 @@ fn cell_counts(mesh: &Mesh) -> Result<Vec<CellCount>> {
 }
 
 fn points(mesh: &Mesh) -> Result<Vec<f64>> {
-    guard(|| Ok(mesh.points().iter().flat_map(|p| p.to_array()).collect()))
+    guard(|| Ok(mesh.points().iter().flat_map(DVec3::to_array).collect()))
 }
 
 fn types(mesh: &Mesh) -> Result<Vec<u8>> {
