@@ -9,13 +9,14 @@
 
 use crate::error::{Error, Result};
 use crate::field::{Association, Component, Field};
-use crate::host::{Session, guard, keep_log, take_log};
+use crate::host::{Session, guard, keep_log, named, take_log};
 use crate::image::{Backdrop, Image};
+use crate::integral::Choice;
 use crate::mesh::cells::name;
 use crate::mesh::{Array, Cells, Mesh, Polyhedra, Values, with_values};
 use crate::transfer::{Convention, TransferFunction};
 use crate::view::{Blend, Camera, ClippingPlane, DepthBuffer, DepthKind, Projection, View};
-use bridge::{ArrayInfo, CameraSpec, CellCount, FieldSpec, Numbers, Stats, TransferSpec, Type, ViewSpec};
+use bridge::{ArrayInfo, CameraSpec, CellCount, FieldSpec, IntegralSpec, Numbers, Stats, TransferSpec, Type, ViewSpec};
 use glam::{DMat4, DVec3};
 use rayon::prelude::*;
 use std::path::Path;
@@ -74,6 +75,17 @@ mod bridge {
         unit_distance: f64,
         /// VTK's convention of image data, not that of unstructured grids.
         slab: bool,
+    }
+
+    /// Names are those of scenes; empty ones, and a table of 0 x 0 x 0 texels, mean the default.
+    struct IntegralSpec<'a> {
+        form: &'a str,
+        table: [i32; 3],
+        lengths: &'a str,
+        texels: &'a str,
+        degree: i32,
+        alpha: &'a str,
+        planes: &'a str,
     }
 
     struct CameraSpec {
@@ -145,7 +157,8 @@ mod bridge {
         fn offsets(mesh: &Mesh) -> Result<Vec<u64>>;
         fn connectivity(mesh: &Mesh) -> Result<Vec<u32>>;
 
-        fn new_session(threads: usize, device: &str, engine: &str, integral: &str) -> Result<Box<Session>>;
+        fn new_session(threads: usize, device: &str, engine: &str) -> Result<Box<Session>>;
+        fn set_integral(session: &mut Session, spec: IntegralSpec) -> Result<()>;
         fn set_mesh(session: &mut Session, mesh: &Mesh, matrix: [f64; 16]) -> Result<()>;
         fn move_points(session: &mut Session, points: Numbers, matrix: [f64; 16]) -> Result<bool>;
         fn move_mesh(session: &mut Session, mesh: &Mesh, matrix: [f64; 16]) -> Result<bool>;
@@ -273,7 +286,7 @@ fn cell_counts(mesh: &Mesh) -> Result<Vec<CellCount>> {
 }
 
 fn points(mesh: &Mesh) -> Result<Vec<f64>> {
-    guard(|| Ok(mesh.points().iter().flat_map(|p| p.to_array()).collect()))
+    guard(|| Ok(mesh.points().iter().flat_map(DVec3::to_array).collect()))
 }
 
 fn types(mesh: &Mesh) -> Result<Vec<u8>> {
@@ -288,8 +301,37 @@ fn connectivity(mesh: &Mesh) -> Result<Vec<u32>> {
     guard(|| Ok(mesh.cells().connectivity.clone()))
 }
 
-fn new_session(threads: usize, device: &str, engine: &str, integral: &str) -> Result<Box<Session>> {
-    guard(|| Session::new(threads, device, engine, integral).map(Box::new))
+fn new_session(threads: usize, device: &str, engine: &str) -> Result<Box<Session>> {
+    guard(|| Session::new(threads, device, engine).map(Box::new))
+}
+
+fn set_integral(session: &mut Session, spec: IntegralSpec) -> Result<()> {
+    session.guarded(|s| s.set_integral(choice(&spec)?))
+}
+
+fn choice(spec: &IntegralSpec) -> Result<Choice> {
+    let table = match spec.table {
+        [0, 0, 0] => None,
+        [front, back, depth] => match [front, back, depth].map(u32::try_from) {
+            [Ok(front), Ok(back), Ok(depth)] => Some([front, back, depth]),
+            _ => {
+                let size = format!("{front} x {back} x {depth}");
+                return Err(Error::Render(format!("a table of {size} texels cannot be; 0 x 0 x 0 is the default")));
+            }
+        },
+    };
+    let degree = spec.degree;
+    let negative = |_| Error::Render(format!("polynomials have a degree from 1 to 8, and not {degree}"));
+    Ok(Choice {
+        form: named("integral", spec.form)?,
+        table,
+        lengths: named("kind of a table's lengths", spec.lengths)?,
+        texels: named("kind of a table's texels", spec.texels)?,
+        degree: u32::try_from(degree).map_err(negative)?,
+        alpha: named("kind of polynomials' alpha", spec.alpha)?,
+        planes: named("kind of a cylinder's planes", spec.planes)?,
+        ..Choice::default()
+    })
 }
 
 fn set_mesh(session: &mut Session, mesh: &Mesh, matrix: [f64; 16]) -> Result<()> {

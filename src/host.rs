@@ -7,12 +7,14 @@ use crate::gpu::DeviceChoice;
 use crate::image::Image;
 use crate::integral::{Choice, Form};
 use crate::mesh::Mesh;
-use crate::mesh::cells::{self, Tetrahedra};
+use crate::mesh::cells::Tetrahedra;
 use crate::render::{Engine, Renderer, Stats};
 use crate::transfer::TransferFunction;
 use crate::view::View;
 use glam::{DMat4, DVec3};
 use rayon::prelude::*;
+use serde::de::value::StrDeserializer;
+use serde::de::{DeserializeOwned, IntoDeserializer};
 use std::collections::VecDeque;
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -27,8 +29,33 @@ const TELL: Duration = Duration::from_millis(20);
 /// Names of the engines that a session may be asked for; the first two are the same.
 pub const ENGINES: [&str; 3] = ["auto", "traverse", "project"];
 
-/// Names of the forms of the ray integral that a session may be asked for; none is the second.
-pub const INTEGRALS: [&str; 5] = ["auto", "exact", "volume", "polynomial", "cylindrical"];
+/// What scenes call `name`, in letters of either case; the default if it is empty.
+///
+/// # Errors
+/// [`Error::Render`] if there is no such `what`, with the names that there are.
+pub fn named<T: DeserializeOwned + Default>(what: &str, name: &str) -> Result<T> {
+    if name.is_empty() {
+        return Ok(T::default());
+    }
+    let lower = name.to_ascii_lowercase();
+    let known: StrDeserializer<'_, Known> = lower.as_str().into_deserializer();
+    T::deserialize(known).map_err(|known| Error::Render(format!("no {what} is called \"{name}\"; {known}")))
+}
+
+/// The names that there are, where one was asked for that there is not.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+struct Known(String);
+
+impl serde::de::Error for Known {
+    fn custom<T: std::fmt::Display>(said: T) -> Self {
+        Known(said.to_string())
+    }
+
+    fn unknown_variant(_: &str, names: &'static [&'static str]) -> Self {
+        Known(format!("there are \"{}\"", names.join("\", \"")))
+    }
+}
 
 /// Runs `work`; a panic in it is an error.
 ///
@@ -65,20 +92,27 @@ impl Session {
     /// A session with `threads` threads of its own (0: one for each core), on a device as [`DeviceChoice::parse`] reads it.
     ///
     /// # Errors
-    /// Those of [`Renderer::with_engine`]; [`Error::Render`] if `engine` is none of [`ENGINES`], or `integral` none of
-    /// [`INTEGRALS`].
-    pub fn new(threads: usize, device: &str, engine: &str, integral: &str) -> Result<Self> {
-        for (what, name, known) in [("engine", engine, &ENGINES[..]), ("integral", integral, &INTEGRALS[..])] {
-            if !name.is_empty() && !known.contains(&name.to_ascii_lowercase().as_str()) {
-                let known = known.join("\", \"");
-                return Err(Error::Render(format!("no {what} is called \"{name}\"; there are \"{known}\"")));
-            }
+    /// Those of [`Renderer::with_engine`]; [`Error::Render`] if `engine` is none of [`ENGINES`].
+    pub fn new(threads: usize, device: &str, engine: &str) -> Result<Self> {
+        if !engine.is_empty() && !ENGINES.contains(&engine.to_ascii_lowercase().as_str()) {
+            let known = ENGINES.join("\", \"");
+            return Err(Error::Render(format!("no engine is called \"{engine}\"; there are \"{known}\"")));
         }
         let engine = if engine.eq_ignore_ascii_case("project") { Engine::Project } else { Engine::Auto };
-        let mut renderer = Renderer::with_engine(threads, DeviceChoice::parse(device), engine)?;
-        let form = Form::ALL.into_iter().find(|f| f.0.eq_ignore_ascii_case(integral));
-        renderer.set_integral(Choice::of(form.map_or(Form::Exact, |f| f.1)));
+        let renderer = Renderer::with_engine(threads, DeviceChoice::parse(device), engine)?;
         Ok(Session { renderer, state: State::NoMesh, mirrored: false, failed: false })
+    }
+
+    /// Integrates in another form from now on; as at first, exactly, until this is called.
+    ///
+    /// # Errors
+    /// [`Error::Render`] if there can be no such table, or no such polynomials, be they asked for or not.
+    pub fn set_integral(&mut self, choice: Choice) -> Result<()> {
+        choice.check(choice.size(0))?;
+        let polynomials = Choice { form: Form::Polynomial, table: None, ..choice };
+        polynomials.check(polynomials.size(0))?;
+        self.renderer.set_integral(choice);
+        Ok(())
     }
 
     /// Runs `work` on this session. After a panic it is not what it should be, and says so.
@@ -118,7 +152,7 @@ impl Session {
             }
             other => other?,
         };
-        tell_skipped(&tetrahedra.skipped);
+        tetrahedra.skipped.log();
         self.mirrored = matrix.determinant() < 0.0;
         let points = mesh.points();
         let moved = (matrix != DMat4::IDENTITY).then(|| self.renderer.install(|| transformed(points, matrix)));
@@ -229,18 +263,6 @@ fn transformed(points: &[DVec3], matrix: DMat4) -> Vec<DVec3> {
     points.par_iter().map(|&p| matrix.transform_point3(p)).collect()
 }
 
-fn tell_skipped(skipped: &cells::Skipped) {
-    for (&kind, count) in &skipped.unsupported {
-        tracing::warn!("{count} cells are left out: {} is not drawn yet", cells::name(kind));
-    }
-    if skipped.invisible > 0 {
-        tracing::warn!("{} cells are left out: they have a point that is not finite", skipped.invisible);
-    }
-    if skipped.lower_dimensional > 0 {
-        tracing::info!("{} cells are left out: they have no volume (2D or less)", skipped.lower_dimensional);
-    }
-}
-
 /// Lines of the log that nobody has taken yet; the oldest go first when there are too many.
 static LINES: OnceLock<Mutex<VecDeque<String>>> = OnceLock::new();
 const MOST_LINES: usize = 1000;
@@ -291,6 +313,8 @@ impl std::io::Write for Line {
 mod tests {
     use super::*;
     use crate::field::{Association, Component};
+    use crate::integral::choice::Texels;
+    use crate::integral::table::Kind;
     use crate::mesh::generate;
     use crate::view::{Camera, Projection};
 
@@ -305,7 +329,7 @@ mod tests {
     }
 
     fn session() -> Session {
-        let mut session = Session::new(2, "cpu", "auto", "exact").unwrap();
+        let mut session = Session::new(2, "cpu", "auto").unwrap();
         let opacity = vec![(0.0, 0.0), (0.4, 1.0), (0.6, 0.0), (1.0, 0.7)];
         session.set_transfer(
             &TransferFunction::new(vec![(0.0, [1.0, 0.5, 0.0]), (1.0, [0.0, 0.5, 1.0])], opacity, 0.3).unwrap(),
@@ -416,10 +440,43 @@ mod tests {
 
     #[test]
     fn unknown_names_are_refused_with_those_that_exist() {
-        let message = Session::new(1, "cpu", "magic", "exact").unwrap_err().to_string();
+        let message = Session::new(1, "cpu", "magic").unwrap_err().to_string();
         assert!(message.contains("magic") && message.contains("traverse") && message.contains("project"), "{message}");
-        let message = Session::new(1, "cpu", "project", "exact").unwrap_err().to_string();
+        let message = Session::new(1, "cpu", "project").unwrap_err().to_string();
         assert!(message.contains("graphics device") && message.contains("traverse"), "{message}");
-        assert!(Session::new(1, "cpu", "traverse", "guess").unwrap_err().to_string().contains("exact"));
+        let message = named::<Form>("integral", "guess").unwrap_err().to_string();
+        let known = "\"auto\", \"exact\", \"volume\", \"polynomial\", \"cylindrical\"";
+        assert_eq!(message, format!("no integral is called \"guess\"; there are {known}"));
+    }
+
+    #[test]
+    fn names_are_those_of_scenes_in_any_case() {
+        assert_eq!(named::<Form>("integral", "Polynomial").unwrap(), Form::Polynomial);
+        assert_eq!(named::<Kind>("kind of lengths", "LOG-normalised").unwrap(), Kind::LogNormalised);
+        assert_eq!(named::<Texels>("kind of texels", "").unwrap(), Texels::Float);
+    }
+
+    #[test]
+    fn tables_are_judged_when_they_are_asked_for_and_then_drawn() {
+        let mut session = session();
+        let mesh = mesh();
+        set(&mut session, &mesh, DMat4::IDENTITY);
+        let exact = draw(&mut session);
+        let mut far_from_exact = |choice: Choice| {
+            session.set_integral(choice).unwrap();
+            draw(&mut session).compare(&exact).unwrap().rmse
+        };
+        let [first, fourth] = [1, 4].map(|degree| far_from_exact(Choice { degree, ..Choice::of(Form::Polynomial) }));
+        assert!(fourth > 0.0 && fourth < first / 2.0, "{fourth} {first}");
+        for (choice, part) in [
+            (Choice { table: Some([1, 64, 16]), ..Choice::of(Form::Volume) }, "at least 2, 2 and 3"),
+            (Choice { degree: 9, ..Choice::of(Form::Polynomial) }, "from 1 to 8, and not 9"),
+            // Wrong wherever it is said.
+            (Choice { degree: 0, ..Choice::default() }, "from 1 to 8, and not 0"),
+        ] {
+            let message = session.set_integral(choice).unwrap_err().to_string();
+            assert!(message.contains(part), "{message}");
+        }
+        assert!(draw(&mut session).compare(&exact).unwrap().rmse <= fourth, "what is refused changes nothing");
     }
 }

@@ -5,6 +5,7 @@
 mod common;
 
 use common::draw::Random;
+use common::shared::meshes_in;
 use common::{Engine, Scene, rounds};
 use glam::{DVec3, dvec3};
 use halite::field::Association;
@@ -13,27 +14,9 @@ use halite::mesh::faces::Faces;
 use halite::mesh::{Array, Mesh, Values};
 use halite::transfer::TransferFunction;
 use halite::view::{Camera, Projection, Ray, View};
-use std::path::{Path, PathBuf};
 
 /// Meshes of more tetrahedra are left to the eye.
 const MOST: usize = 600_000;
-
-fn files() -> Vec<PathBuf> {
-    let mut files = Vec::new();
-    let mut folders = vec![Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data")];
-    while let Some(folder) = folders.pop() {
-        for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
-            let path = entry.path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|e| e == "vtu" || e == "pvtu") {
-                files.push(path);
-            }
-        }
-    }
-    files.sort();
-    files
-}
 
 /// The length of a ray in a box.
 fn chord(ray: &Ray, [low, high]: [DVec3; 2]) -> f64 {
@@ -77,7 +60,7 @@ fn boxes(mesh: &Mesh, tetrahedra: &Tetrahedra) -> Option<[[DVec3; 2]; 2]> {
 #[test]
 fn covered_length_is_the_chord_of_the_box() {
     let (mut found, mut seen) = (vec![], 0);
-    for path in files() {
+    for path in meshes_in("data") {
         let Ok(mesh) = halite::io::open(&path, &|_| ()) else { continue };
         seen += 1;
         let Ok(tetrahedra) = Tetrahedra::new(&mesh) else { continue };

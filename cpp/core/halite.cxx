@@ -219,9 +219,9 @@ struct Renderer::Inner
 };
 
 Renderer::Renderer(const Settings& s)
-  : Data(new Inner{ call(
-      [&] { return bridge::new_session(s.threads, str(s.device), str(s.engine), str(s.integral)); }) })
+  : Data(new Inner{ call([&] { return bridge::new_session(s.threads, str(s.device), str(s.engine)); }) })
 {
+  this->setIntegral(s.integral);
 }
 
 Renderer::Renderer(Renderer&&) noexcept = default;
@@ -281,6 +281,14 @@ void Renderer::setTransferFunction(const TransferFunction& function)
     bridge::set_transfer(*this->Data->Box,
       { slice(color.data(), color.size()), slice(opacity.data(), opacity.size()), function.unitDistance,
         function.convention == OpacityConvention::Opacity });
+  });
+}
+
+void Renderer::setIntegral(const Integral& i)
+{
+  call([&] {
+    bridge::set_integral(*this->Data->Box,
+      { str(i.form), i.table, str(i.lengths), str(i.texels), i.degree, str(i.alpha), str(i.planes) });
   });
 }
 

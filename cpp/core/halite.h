@@ -281,7 +281,29 @@ struct Statistics
   std::uint64_t steps = 0, repairedRays = 0, deviceBytes = 0, uploadedBytes = 0;
 };
 
-/// How a renderer works; fixed once it is made. Empty names mean the first that is said here.
+/// The form of the ray integral, by the names that scenes have for it. Empty names mean the first that is said here.
+struct Integral
+{
+  /// "exact"; "volume", "polynomial" or "cylindrical": a pre-integrated table; or "auto": exact, or a table where functions have
+  /// so many knots that it is faster. Tables are for fields of one component.
+  std::string form;
+  /// Texels: values in front, values behind, and lengths of a volume or planes of a cylinder. At least 2 x 2 x 3 in a volume; as
+  /// many in front as behind in the others; a multiple of 4 planes; polynomials have as many layers as their degree wants. All 0:
+  /// as many as suit the function. At most 1 GiB at 16 bytes each.
+  std::array<std::int32_t, 3> table = { 0, 0, 0 };
+  /// Of a volume: "log-normalised", "log" or "uniform".
+  std::string lengths;
+  /// "float", "unorm16" or "unorm8".
+  std::string texels;
+  /// Of polynomials: 1 to 8.
+  std::int32_t degree = 2;
+  /// Of polynomials, how opacity depends on the length: "exponential" or "linear".
+  std::string alpha;
+  /// Of a cylinder, which are read: "two", "one", or "packed" (two, in less memory).
+  std::string planes;
+};
+
+/// How a renderer works; fixed once it is made, but for the integral. Empty names mean the first that is said here.
 struct Settings
 {
   /// 0: one for each core.
@@ -291,10 +313,8 @@ struct Settings
   /// "auto" or "traverse": rays walk from cell to cell. "project": cells are sorted by depth and blended; it needs a device for
   /// graphics (not "cpu"), refuses the maximum, and its order is right for some meshes only.
   std::string engine;
-  /// "exact"; "volume", "polynomial" or "cylindrical": a table, which is as large as it is by default, and built while frames
-  /// are drawn with the exact integral if the transfer function alone changed; or "auto": exact, or a table where functions have
-  /// so many knots that it is faster.
-  std::string integral;
+  /// See Renderer::setIntegral.
+  Integral integral;
 };
 
 /// Draws one mesh as often as wanted; keeps what does not change between frames.
@@ -323,6 +343,9 @@ public:
   /// Draws numbers, in tuples of `components`, one for each point or cell of the mesh.
   void setField(const std::string& name, Association, std::size_t components, int component, Numbers);
   void setTransferFunction(const TransferFunction&);
+  /// Integrates in another form from the next frame on, which waits for its table if one is named. Where the transfer function
+  /// alone changes, frames are exact until the new table is built, which happens meanwhile.
+  void setIntegral(const Integral&);
   /// Draws into `pixels`: linear premultiplied red, green, blue and opacity of each pixel, row by row. False if `progress` ended
   /// it; `pixels` are then as they were.
   bool render(const View& view, float* pixels, const Progress& progress = {});

@@ -1,26 +1,16 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 // The core's C++ face, without VTK: test_core CUBE.vtu FOLDER
+#include "expect.h"
+
 #include <halite.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 #include <fstream>
 #include <thread>
 
 namespace
 {
-
-void expect(bool holds, const char* what, int line)
-{
-  if (!holds)
-  {
-    std::fprintf(stderr, "line %d: %s\n", line, what);
-    std::exit(1);
-  }
-}
-#define EXPECT(condition) expect((condition), #condition, __LINE__)
 
 // What a call throws; empty if nothing.
 template <class Work>
@@ -60,6 +50,23 @@ halite::View fromAbove()
   view.camera.parallelScale = 0.4;
   view.camera.clippingRange = { 1, 9 };
   return view;
+}
+
+halite::View slanted()
+{
+  halite::View view = fromAbove();
+  view.camera.position = { 3, -2, 4 };
+  return view;
+}
+
+double farthest(const std::vector<float>& a, const std::vector<float>& b)
+{
+  double most = 0;
+  for (std::size_t i = 0; i < a.size(); ++i)
+  {
+    most = std::max(most, std::abs(double(a[i]) - b[i]));
+  }
+  return most;
 }
 
 std::vector<float> draw(halite::Renderer& renderer, const halite::View& view)
@@ -168,6 +175,30 @@ int main(int argc, char** argv)
   flat.opacity = { { 1, 0 }, { 5, 1 } };
   renderer.setTransferFunction(flat);
   EXPECT(isAll(draw(renderer, view), Half));
+
+  // Forms of the integral: more of a polynomial's terms are nearer to the exact one.
+  halite::TransferFunction hue = tent();
+  hue.color = { { 0, { 1, 0, 0 } }, { 0.3, { 0, 1, 0 } }, { 1, { 0, 0, 1 } } };
+  second.setTransferFunction(hue);
+  const auto exact = draw(second, slanted());
+  const auto errorOf = [&](const halite::Integral& integral) {
+    second.setIntegral(integral);
+    return farthest(draw(second, slanted()), exact);
+  };
+  halite::Integral integral;
+  integral.form = "polynomial";
+  integral.degree = 1;
+  const double first = errorOf(integral);
+  integral.degree = 4;
+  const double fourth = errorOf(integral);
+  EXPECT(fourth > 0 && fourth < first / 2);
+  integral.degree = 0;
+  EXPECT(has(failure([&] { second.setIntegral(integral); }), "from 1 to 8"));
+  integral = { "volume", { 64, 64, -1 } };
+  EXPECT(has(failure([&] { second.setIntegral(integral); }), "64 x 64 x -1"));
+  EXPECT(has(failure([] { halite::Renderer({ 1, "cpu", "", { "exact", {}, "long" } }); }), "log-normalised"));
+  EXPECT(farthest(draw(second, slanted()), exact) == fourth);
+  EXPECT(errorOf({}) == 0);
 
   // Errors are exceptions that say what is wrong, and harm nothing.
   EXPECT(has(failure([] { halite::Mesh::open("/no/such/file.vtu"); }), "/no/such/file.vtu"));

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 // A program that asks for VTK's mapper and, linked with the module, gets Halite's. One cube with a tent of opacity, of which
 // VTK's own draws nothing.
+#include "expect.h"
+
 #include "vtkCamera.h"
 #include "vtkColorTransferFunction.h"
 #include "vtkDoubleArray.h"
@@ -16,22 +18,10 @@
 #include "vtkVolume.h"
 #include "vtkVolumeProperty.h"
 
-#include <cstdio>
-#include <cstdlib>
 #include <cstring>
 
 namespace
 {
-
-void expect(bool holds, const char* what, int line)
-{
-  if (!holds)
-  {
-    std::fprintf(stderr, "line %d: %s\n", line, what);
-    std::exit(1);
-  }
-}
-#define EXPECT(condition) expect((condition), #condition, __LINE__)
 
 int middle(vtkRenderWindow* window)
 {

@@ -3,6 +3,7 @@
 
 #include "vtkColorTransferFunction.h"
 #include "vtkPiecewiseFunction.h"
+#include "vtkVolumeProperty.h"
 
 #include <algorithm>
 #include <cmath>
@@ -213,6 +214,39 @@ Opacity KnotsOf(vtkPiecewiseFunction* function)
     opacity.push_back({ k.s, k.value[0] });
   }
   return opacity;
+}
+
+const Knots& Cache::KnotsOf(vtkVolumeProperty* property, bool isRGBA)
+{
+  const bool isGrey = property->GetColorChannels() == 1;
+  vtkPiecewiseFunction* opacity = property->GetScalarOpacity(0);
+  vtkPiecewiseFunction* greys = isGrey ? property->GetGrayTransferFunction(0) : nullptr;
+  vtkColorTransferFunction* colors = isGrey ? nullptr : property->GetRGBTransferFunction(0);
+  ::Key sources;
+  sources << static_cast<std::uint64_t>(opacity->GetMTime())
+          << static_cast<std::uint64_t>(isGrey ? greys->GetMTime() : colors->GetMTime())
+          << static_cast<std::uint64_t>(isRGBA);
+  // Properties that are gone leave theirs behind.
+  if (this->Kept.size() > 100)
+  {
+    this->Kept.clear();
+  }
+  Knots& knots = this->Kept[property];
+  if (knots.Sources != sources)
+  {
+    knots.Sources = sources;
+    if (isRGBA)
+    {
+      knots.Color = { { 0, { 1, 1, 1 } } };
+      knots.Opacity.clear();
+    }
+    else
+    {
+      knots.Color = isGrey ? GreyKnotsOf(greys) : Functions::KnotsOf(colors);
+      knots.Opacity = Functions::KnotsOf(opacity);
+    }
+  }
+  return knots;
 }
 
 }

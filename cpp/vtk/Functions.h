@@ -2,10 +2,18 @@
 // VTK's transfer functions as knots.
 #pragma once
 
+#include "Key.h"
+#include "vtkHaliteCompatibility.h"
+
 #include "halite.h"
 
+#include <map>
+
+VTK_ABI_NAMESPACE_BEGIN
 class vtkColorTransferFunction;
 class vtkPiecewiseFunction;
+class vtkVolumeProperty;
+VTK_ABI_NAMESPACE_END
 
 namespace Functions
 {
@@ -18,5 +26,23 @@ using Opacity = std::vector<halite::TransferFunction::OpacityKnot>;
 Color KnotsOf(vtkColorTransferFunction* function);
 Color GreyKnotsOf(vtkPiecewiseFunction* function);
 Opacity KnotsOf(vtkPiecewiseFunction* function);
+
+struct Knots
+{
+  ::Key Sources;
+  Functions::Color Color;
+  Functions::Opacity Opacity;
+};
+
+// The knots of properties, found anew only where a function changed.
+class Cache
+{
+public:
+  // Those of component 0. Of RGBA, of which the array itself has the colours: white, and no opacity.
+  const Knots& KnotsOf(vtkVolumeProperty* property, bool isRGBA);
+
+private:
+  std::map<vtkVolumeProperty*, Knots> Kept;
+};
 
 }

@@ -2,6 +2,8 @@
 // VTK's arrays as the core reads them: in place where their layout allows it.
 #pragma once
 
+#include "vtkHaliteCompatibility.h"
+
 #include "halite.h"
 
 #include "vtkSmartPointer.h"
@@ -9,9 +11,11 @@
 #include <cstdint>
 #include <vector>
 
+VTK_ABI_NAMESPACE_BEGIN
 class vtkDataArray;
 class vtkPoints;
 class vtkUnstructuredGridBase;
+VTK_ABI_NAMESPACE_END
 
 class MeshView
 {

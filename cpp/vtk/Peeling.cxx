@@ -3,6 +3,8 @@
 // shader's declarations, and sets them as that shader's parameters. A shader here writes the depths out instead.
 #include "Peeling.h"
 
+#include "OpenGLNumbers.h"
+
 #include "vtkDualDepthPeelingPass.h"
 #include "vtkInformation.h"
 #include "vtkInformationObjectBaseVectorKey.h"
@@ -22,10 +24,6 @@
 
 namespace
 {
-
-// OpenGL's numbers, as in Presenter.cxx.
-const unsigned int One = 1, OneMinusSourceAlpha = 0x0303, Add = 0x8006, Largest = 0x8008, DepthTest = 0x0B71, Blend = 0x0BE2,
-                   CullFace = 0x0B44, ScissorTest = 0x0C11;
 
 // An outer depth is a layer that was peeled, an inner one the next; in front they are negative, and -1 is none.
 const char* const Questions[] = {
@@ -159,11 +157,11 @@ void Peeling::Ask(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolum
   this->Now = StageOf(pass, mapper, volume);
   vtkOpenGLState* state = this->Window->GetState();
   vtkOpenGLState::ScopedglViewport viewport(state);
-  vtkOpenGLState::ScopedglEnableDisable scissorTest(state, ScissorTest);
-  vtkOpenGLState::ScopedglEnableDisable depthTest(state, DepthTest);
-  vtkOpenGLState::ScopedglEnableDisable blend(state, Blend);
-  vtkOpenGLState::ScopedglEnableDisable cullFace(state, CullFace);
-  for (unsigned int setting : { ScissorTest, DepthTest, Blend, CullFace })
+  vtkOpenGLState::ScopedglEnableDisable scissorTest(state, OpenGL::ScissorTest);
+  vtkOpenGLState::ScopedglEnableDisable depthTest(state, OpenGL::DepthTest);
+  vtkOpenGLState::ScopedglEnableDisable blend(state, OpenGL::Blend);
+  vtkOpenGLState::ScopedglEnableDisable cullFace(state, OpenGL::CullFace);
+  for (unsigned int setting : { OpenGL::ScissorTest, OpenGL::DepthTest, OpenGL::Blend, OpenGL::CullFace })
   {
     state->vtkglDisable(setting);
   }
@@ -208,16 +206,16 @@ void Peeling::Answer(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVo
   Latest.Time = pass->GetMTime();
 
   vtkOpenGLState* state = this->Window->GetState();
-  vtkOpenGLState::ScopedglEnableDisable depthTest(state, DepthTest);
-  vtkOpenGLState::ScopedglEnableDisable blend(state, Blend);
-  vtkOpenGLState::ScopedglEnableDisable cullFace(state, CullFace);
+  vtkOpenGLState::ScopedglEnableDisable depthTest(state, OpenGL::DepthTest);
+  vtkOpenGLState::ScopedglEnableDisable blend(state, OpenGL::Blend);
+  vtkOpenGLState::ScopedglEnableDisable cullFace(state, OpenGL::CullFace);
   vtkOpenGLState::ScopedglBlendFuncSeparate blendFunction(state);
-  state->vtkglDisable(DepthTest);
-  state->vtkglDisable(CullFace);
+  state->vtkglDisable(OpenGL::DepthTest);
+  state->vtkglDisable(OpenGL::CullFace);
   const bool replaces = first && this->Now != Rest;
-  replaces ? state->vtkglDisable(Blend) : state->vtkglEnable(Blend);
-  state->vtkglBlendFuncSeparate(One, OneMinusSourceAlpha, One, OneMinusSourceAlpha);
-  state->vtkglBlendEquation(Add);
+  replaces ? state->vtkglDisable(OpenGL::Blend) : state->vtkglEnable(OpenGL::Blend);
+  state->vtkglBlendFuncSeparate(OpenGL::One, OpenGL::OneMinusSourceAlpha, OpenGL::One, OpenGL::OneMinusSourceAlpha);
+  state->vtkglBlendEquation(OpenGL::Add);
 
   vtkOpenGLQuadHelper& quad = this->Ready(this->Answers[this->Now], ::Answers[this->Now]);
   pass->SetShaderParameters(quad.Program, mapper, volume);
@@ -235,5 +233,5 @@ void Peeling::Answer(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVo
     texture->Deactivate();
   }
   // What the pass has set for volumes.
-  state->vtkglBlendEquation(this->Now == Rest ? Add : Largest);
+  state->vtkglBlendEquation(this->Now == Rest ? OpenGL::Add : OpenGL::Largest);
 }

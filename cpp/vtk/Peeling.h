@@ -2,18 +2,22 @@
 // A volume among the layers of translucent surfaces: what VTK's dual depth peeling asks of a volume, and how it is answered.
 #pragma once
 
+#include "vtkHaliteCompatibility.h"
+
 #include "vtkWeakPointer.h"
 
 #include <array>
 #include <memory>
 #include <vector>
 
+VTK_ABI_NAMESPACE_BEGIN
 class vtkAbstractMapper;
 class vtkOpenGLQuadHelper;
 class vtkOpenGLRenderPass;
 class vtkOpenGLRenderWindow;
 class vtkTextureObject;
 class vtkVolume;
+VTK_ABI_NAMESPACE_END
 
 // Window depths between which a part of a pixel's ray lies: nothing of it if they do not grow.
 struct Part

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 #include "Presenter.h"
 
+#include "OpenGLNumbers.h"
 #include "Peeling.h"
 
 #include "vtkOpenGLQuadHelper.h"
@@ -15,10 +16,6 @@
 
 namespace
 {
-
-// OpenGL's numbers, so that its headers, which differ between versions of VTK, are not needed.
-const unsigned int One = 1, OneMinusSourceAlpha = 0x0303, DepthTest = 0x0B71, Blend = 0x0BE2, CullFace = 0x0B44,
-                   ScissorTest = 0x0C11;
 
 const char* const Fragment = "//VTK::System::Dec\n"
                              "//VTK::Output::Dec\n"
@@ -53,7 +50,7 @@ void Presenter::ReadDepths(
   vtkOpenGLRenderWindow* window, const Viewport& v, int across, int down, std::vector<float>& depths)
 {
   // VTK's call resolves several samples to one, and disables the scissor test.
-  vtkOpenGLState::ScopedglEnableDisable scissor(window->GetState(), ScissorTest);
+  vtkOpenGLState::ScopedglEnableDisable scissor(window->GetState(), OpenGL::ScissorTest);
   depths.resize(static_cast<std::size_t>(v.Width) * v.Height);
   if (!window->GetZbufferData(v.X, v.Y, v.X + v.Width - 1, v.Y + v.Height - 1, depths.data()))
   {
@@ -96,21 +93,21 @@ void Presenter::Present(vtkTextureObject* texture, const Viewport& v)
   vtkOpenGLState* state = this->Window->GetState();
   vtkOpenGLState::ScopedglViewport viewport(state);
   vtkOpenGLState::ScopedglScissor scissor(state);
-  vtkOpenGLState::ScopedglEnableDisable scissorTest(state, ScissorTest);
-  vtkOpenGLState::ScopedglEnableDisable depthTest(state, DepthTest);
-  vtkOpenGLState::ScopedglEnableDisable blend(state, Blend);
-  vtkOpenGLState::ScopedglEnableDisable cullFace(state, CullFace);
+  vtkOpenGLState::ScopedglEnableDisable scissorTest(state, OpenGL::ScissorTest);
+  vtkOpenGLState::ScopedglEnableDisable depthTest(state, OpenGL::DepthTest);
+  vtkOpenGLState::ScopedglEnableDisable blend(state, OpenGL::Blend);
+  vtkOpenGLState::ScopedglEnableDisable cullFace(state, OpenGL::CullFace);
   vtkOpenGLState::ScopedglDepthMask depthMask(state);
   vtkOpenGLState::ScopedglBlendFuncSeparate blendFunction(state);
 
   state->vtkglViewport(v.X, v.Y, v.Width, v.Height);
   state->vtkglScissor(v.X, v.Y, v.Width, v.Height);
-  state->vtkglEnable(ScissorTest);
-  state->vtkglDisable(DepthTest);
-  state->vtkglDisable(CullFace);
+  state->vtkglEnable(OpenGL::ScissorTest);
+  state->vtkglDisable(OpenGL::DepthTest);
+  state->vtkglDisable(OpenGL::CullFace);
   state->vtkglDepthMask(0);
-  state->vtkglEnable(Blend);
-  state->vtkglBlendFuncSeparate(One, OneMinusSourceAlpha, One, OneMinusSourceAlpha);
+  state->vtkglEnable(OpenGL::Blend);
+  state->vtkglBlendFuncSeparate(OpenGL::One, OpenGL::OneMinusSourceAlpha, OpenGL::One, OpenGL::OneMinusSourceAlpha);
 
   if (!this->Quad)
   {

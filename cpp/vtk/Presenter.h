@@ -2,6 +2,8 @@
 // Between a window's frame buffer and pictures in memory.
 #pragma once
 
+#include "vtkHaliteCompatibility.h"
+
 #include "vtkSmartPointer.h"
 #include "vtkWeakPointer.h"
 
@@ -9,11 +11,14 @@
 #include <vector>
 
 class Peeling;
+
+VTK_ABI_NAMESPACE_BEGIN
 class vtkOpenGLQuadHelper;
 class vtkOpenGLRenderWindow;
 class vtkRenderer;
 class vtkTextureObject;
 class vtkWindow;
+VTK_ABI_NAMESPACE_END
 
 // The part of a window that a renderer draws to, in pixels from its lower left corner.
 struct Viewport

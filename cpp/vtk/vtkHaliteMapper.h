@@ -69,11 +69,63 @@ public:
   ///@{
   /**
    * The form of the ray integral: "exact" (the default); a pre-integrated table, "volume", "polynomial" or "cylindrical"; or
-   * "auto": exact, or a table where a function has so many points that it is faster. After an edit of the volume's property
-   * frames are exact until the table is built anew, which happens meanwhile.
+   * "auto": exact, or a table where a function has so many points that it is faster. Tables are for arrays of which one component
+   * or the magnitude is drawn. After an edit of the volume's property frames are exact until the table is built anew, which
+   * happens meanwhile; after a change of this or of what follows, the next frame waits for it.
    */
   vtkSetStringMacro(Integral);
   vtkGetStringMacro(Integral);
+  ///@}
+
+  ///@{
+  /**
+   * Texels of the table: values in front, values behind, and lengths of a volume or planes of a cylinder. A volume has at least
+   * 2 x 2 x 3; the others have as many in front as behind, at least 2; a cylinder's planes are a multiple of 4; polynomials have
+   * as many layers as their degree wants, and the third number is not read. At most 1 GiB, at 16 bytes each. All 0 (the default):
+   * as many as suit the function.
+   */
+  vtkSetVector3Macro(TableSize, int);
+  vtkGetVector3Macro(TableSize, int);
+  ///@}
+
+  ///@{
+  /**
+   * The lengths of a volume: "log-normalised" (the default), "log" or "uniform".
+   */
+  vtkSetStringMacro(TableLengths);
+  vtkGetStringMacro(TableLengths);
+  ///@}
+
+  ///@{
+  /**
+   * What the table's texels are: "float" (32 bits, the default), "unorm16" or "unorm8".
+   */
+  vtkSetStringMacro(TableTexels);
+  vtkGetStringMacro(TableTexels);
+  ///@}
+
+  ///@{
+  /**
+   * The degree of polynomials, from 1 to 8; 2 by default.
+   */
+  vtkSetMacro(PolynomialDegree, int);
+  vtkGetMacro(PolynomialDegree, int);
+  ///@}
+
+  ///@{
+  /**
+   * How the opacity of polynomials depends on the length: "exponential" (as it does; the default), or "linear".
+   */
+  vtkSetStringMacro(PolynomialAlpha);
+  vtkGetStringMacro(PolynomialAlpha);
+  ///@}
+
+  ///@{
+  /**
+   * Which planes of a cylinder are read: the "two" nearest (the default), "one", or "packed", two that are stored in less memory.
+   */
+  vtkSetStringMacro(CylinderPlanes);
+  vtkGetStringMacro(CylinderPlanes);
   ///@}
 
   enum OpacityConventions
@@ -147,12 +199,12 @@ public:
    * How often, since this mapper was made: the core drew; mesh, points, field and transfer function were handed to it; an
    * array's layout forced a copy.
    */
-  vtkGetMacro(NumberOfFrames, vtkIdType);
-  vtkGetMacro(NumberOfMeshUploads, vtkIdType);
-  vtkGetMacro(NumberOfPointUploads, vtkIdType);
-  vtkGetMacro(NumberOfFieldUploads, vtkIdType);
-  vtkGetMacro(NumberOfFunctionUploads, vtkIdType);
-  vtkGetMacro(NumberOfCopies, vtkIdType);
+  vtkIdType GetNumberOfFrames();
+  vtkIdType GetNumberOfMeshUploads();
+  vtkIdType GetNumberOfPointUploads();
+  vtkIdType GetNumberOfFieldUploads();
+  vtkIdType GetNumberOfFunctionUploads();
+  vtkIdType GetNumberOfCopies();
   ///@}
 
   /**
@@ -168,6 +220,12 @@ protected:
   char* Device = nullptr;
   char* Engine = nullptr;
   char* Integral = nullptr;
+  int TableSize[3] = { 0, 0, 0 };
+  char* TableLengths = nullptr;
+  char* TableTexels = nullptr;
+  int PolynomialDegree = 2;
+  char* PolynomialAlpha = nullptr;
+  char* CylinderPlanes = nullptr;
   int OpacityConvention = EXTINCTION;
   double ImageSampleDistance = 1.0;
   int NumberOfThreads = 0;
@@ -177,12 +235,6 @@ protected:
   double DepthTime = 0;
   double CoreTime = 0;
   double PresentTime = 0;
-  vtkIdType NumberOfFrames = 0;
-  vtkIdType NumberOfMeshUploads = 0;
-  vtkIdType NumberOfPointUploads = 0;
-  vtkIdType NumberOfFieldUploads = 0;
-  vtkIdType NumberOfFunctionUploads = 0;
-  vtkIdType NumberOfCopies = 0;
 
   /**
    * Draws what was put off until a renderer has finished.

@@ -21,6 +21,16 @@ use wgpu::BufferUsages as Usage;
 
 const TRAVERSE: &str = include_str!("../../shaders/traverse.wgsl");
 
+/// The arrays that the walk reads, and what WGSL calls their elements.
+const ARRAYS: [(&str, &str); 6] = [
+    ("cells", "Cell"),
+    ("faces", "Outer"),
+    ("points", "Point"),
+    ("volumes", "f32"),
+    ("boxes", "Box"),
+    ("values", "Value"),
+];
+
 /// How a segment joins the light before it.
 const ADD_EXACT: &str = "fn add(front: Value, back: Value, length: f32) { add_segment(front, back, length); }\n";
 const ADD_TABULATED: &str =
@@ -225,17 +235,9 @@ impl Traverse {
 
     /// The arrays of group 1, in the order of [`Self::chunks`].
     fn arrays(&self) -> Result<[Array; 6]> {
-        let names = [
-            ("cells", "Cell"),
-            ("faces", "Outer"),
-            ("points", "Point"),
-            ("volumes", "f32"),
-            ("boxes", "Box"),
-            ("values", "Value"),
-        ];
         let chunks = self.chunks()?;
         Ok(std::array::from_fn(|i| {
-            let (name, element) = names[i];
+            let (name, element) = ARRAYS[i];
             Array { name, element, chunks: chunks[i].buffers.len(), shift: chunks[i].shift }
         }))
     }

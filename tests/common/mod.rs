@@ -9,6 +9,7 @@
 )]
 
 pub(crate) mod draw;
+pub(crate) mod shared;
 
 use halite::field::{Association, Component, Field};
 use halite::gpu::DeviceChoice;

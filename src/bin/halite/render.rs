@@ -5,7 +5,7 @@ use halite::field::{Association, Component, Field};
 use halite::gpu::DeviceChoice;
 use halite::image::{Backdrop, Image};
 use halite::integral::Choice;
-use halite::mesh::{Mesh, cells, cells::Tetrahedra};
+use halite::mesh::{Mesh, cells::Tetrahedra};
 use halite::project::Switches;
 use halite::render::{self, Renderer, Stats};
 use halite::scene::{Scalars, Scene};
@@ -156,7 +156,7 @@ pub(crate) fn prepare(options: &Request, given: Option<Scene>) -> Result<Job> {
     let start = Instant::now();
     let tetrahedra = Tetrahedra::new(&mesh).with_context(|| path.display().to_string())?;
     let split_ms = ms(start);
-    tell_skipped(&tetrahedra.skipped);
+    tetrahedra.skipped.log();
 
     let scalars = options.scalars(given.as_ref(), &mesh)?;
     let field = scalars.field(&mesh).with_context(|| path.display().to_string())?;
@@ -296,21 +296,6 @@ fn check_engine(scene: &Scene) -> Result<()> {
         check::<Engine>("engine", name)?;
     }
     Ok(())
-}
-
-fn tell_skipped(skipped: &cells::Skipped) {
-    for (&kind, count) in &skipped.unsupported {
-        tracing::warn!("{count} cells are left out: {} is not drawn yet", cells::name(kind));
-    }
-    if skipped.invisible > 0 {
-        tracing::warn!("{} cells are left out: they have a point that is not finite", skipped.invisible);
-    }
-    if skipped.lower_dimensional > 0 {
-        tracing::info!("{} cells are left out: they have no volume (2D or less)", skipped.lower_dimensional);
-    }
-    if skipped.ghost > 0 {
-        tracing::info!("{} cells are left out: they are ghosts", skipped.ghost);
-    }
 }
 
 /// A picture, and what it took.

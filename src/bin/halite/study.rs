@@ -180,21 +180,33 @@ fn draw(variant: Variant, frames: u32, renderer: &mut Renderer, view: &View, tru
     renderer.set_switches(variant.switches);
     let image = renderer.render(view, &|_| ())?;
     let order_ms = renderer.stats().projection.map_or(0.0, |p| p.order_ms);
-    let mut times = Vec::new();
-    for _ in 0..frames {
-        renderer.render(view, &|_| ())?;
-        times.push(renderer.stats().frame_ms);
-    }
-    times.sort_by(f64::total_cmp);
-    let difference = image.compare(truth);
-    let (max, rmse) = difference.map_or((f64::INFINITY, f64::INFINITY), |d| (d.max, d.rmse));
+    let row = Row::measured(variant, image, truth, frames, renderer, view)?;
     let projection = renderer.stats().projection.unwrap_or_default();
-    let frame_ms = times[times.len() / 2];
     let (cells, fragments, project_ms) = (projection.drawn_cells, projection.fragments, projection.project_ms);
-    Ok(Row { variant, image, max, rmse, order_ms, project_ms, frame_ms, cells, fragments })
+    Ok(Row { order_ms, project_ms, cells, fragments, ..row })
 }
 
 impl Row {
+    /// The errors of `image`, and the time of as many `frames` of it more; nothing of the projection.
+    fn measured(
+        variant: Variant,
+        image: Image,
+        truth: &Image,
+        frames: u32,
+        renderer: &mut Renderer,
+        view: &View,
+    ) -> halite::Result<Self> {
+        let mut times = Vec::new();
+        for _ in 0..frames {
+            renderer.render(view, &|_| ())?;
+            times.push(renderer.stats().frame_ms);
+        }
+        times.sort_by(f64::total_cmp);
+        let frame_ms = times[times.len() / 2];
+        let (max, rmse) = image.compare(truth).map_or((f64::INFINITY, f64::INFINITY), |d| (d.max, d.rmse));
+        Ok(Row { variant, image, max, rmse, order_ms: 0.0, project_ms: None, frame_ms, cells: 0, fragments: None })
+    }
+
     /// Tetrahedra of the mesh over the time of a frame whose camera moved, in 1/s.
     fn rate(&self, tetrahedra: u64) -> f64 {
         tetrahedra as f64 * 1e3 / (self.order_ms + self.frame_ms)

@@ -6,7 +6,7 @@
 //! cell, all but the corners of a Bézier cell) is added where the cell's shape functions put it. Its weights are the same
 //! numbers for both cells of a face, so that both put it at the same place, bit for bit.
 
-use super::{HEXAHEDRON, OCTAHEDRON, PYRAMID, Shape, TETRA, WEDGE};
+use super::linear::{HEXAHEDRON, OCTAHEDRON, PYRAMID, Shape, TETRA, WEDGE};
 
 /// The greatest degree: VTK's (`vtkHigherOrderHexahedron::MaxDegree`).
 pub(super) const MAX_DEGREE: usize = 10;
@@ -463,7 +463,19 @@ fn bernstein(vtk_type: u8, degrees: [usize; 3]) -> Vec<Node> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::linear::split;
     use super::*;
+    use glam::DVec3;
+
+    /// Volume of the tetrahedra of a cell whose points are at `places`.
+    fn volume(shape: &Shape, places: &[[f64; 3]; 8]) -> f64 {
+        let mut out = vec![[0; 4]; shape.tetrahedra];
+        let ids: Vec<u32> = (0..shape.points as u32).collect();
+        let place = |n: u32| DVec3::from(places[n as usize]);
+        split(shape, &ids, place, &mut out);
+        let volume = |[a, b, c, d]: [DVec3; 4]| (b - a).cross(c - a).dot(d - a).abs() / 6.0;
+        out.iter().map(|t| volume(t.map(place))).sum()
+    }
 
     /// The lattice points in the order of their numbers, as VTK 9.7 has them.
     #[test]
@@ -509,7 +521,7 @@ mod tests {
                     .map(|x| x.map(|x| x as f64 / p as f64))
                     .collect();
                 let volume: f64 =
-                    recipe.parts.iter().map(|(shape, ids)| shape.volume(&ids.map(|i| places[i as usize]))).sum();
+                    recipe.parts.iter().map(|(shape, ids)| volume(shape, &ids.map(|i| places[i as usize]))).sum();
                 assert!((volume - share).abs() < 1e-12, "type {vtk_type}, degree {p}: {volume}");
             }
         }

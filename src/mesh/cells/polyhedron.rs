@@ -4,7 +4,7 @@
 //! middle and its faces, cut into triangles. How a face is cut depends on its own points alone, so two neighbours agree, and
 //! a quad is cut like that of any cell. Nodes that hang on the edges of a face are corners of it like all others.
 
-use super::order;
+use super::linear::order;
 use glam::{DMat3, DVec3};
 
 /// Faces with more corners are cut into a fan: the best cut takes their third power.

@@ -112,16 +112,7 @@ fn draw(variant: Variant, frames: u32, renderer: &mut Renderer, view: &View, tru
     renderer.set_integral(variant.integral);
     renderer.set_switches(variant.switches);
     let image = renderer.render(view, &|_| ())?;
-    let mut times = Vec::new();
-    for _ in 0..frames {
-        renderer.render(view, &|_| ())?;
-        times.push(renderer.stats().frame_ms);
-    }
-    times.sort_by(f64::total_cmp);
-    let difference = image.compare(truth);
-    let (max, rmse) = difference.map_or((f64::INFINITY, f64::INFINITY), |d| (d.max, d.rmse));
-    let frame_ms = times[times.len() / 2];
-    Ok(Row { variant, image, max, rmse, order_ms: 0.0, project_ms: None, frame_ms, cells: 0, fragments: None })
+    Row::measured(variant, image, truth, frames, renderer, view)
 }
 
 fn table(rows: &[Line]) -> String {

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Settings of pre-integrated tables: that each acts, that a bad one is said, and that none hands over the mesh again."""
+import numpy as np
+from scene import *  # noqa: F403
+from test_pictures import RAMP, SLANT, WAVES
+UNIT = 0.15
+
+
+def table(**settings):
+    """One brick, so that segments are long; its window and renderer."""
+    v = volume(lattice(1, field=SLANT), WAVES, RAMP, UNIT, **settings)
+    return v, *scene(v)
+
+
+def apart(w, expected):
+    """How far a picture is from another, root mean square, in units of 1/255."""
+    return np.sqrt(np.mean((pixels(w) - expected) ** 2))
+
+
+def errors_of(form, name, values, **settings):
+    """How far pictures with each of these values are from the truth; none may be another's, and none may take the mesh."""
+    v, w, r = table(Integral=form, **settings)
+    m = v.GetMapper()
+    expected = truth(r, (64, 64), field=SLANT, opacity=WAVES, color=RAMP, unit=UNIT)
+    seen, errors = [], []
+    for value in values:
+        getattr(m, "Set" + name)(*value if isinstance(value, tuple) else (value,))
+        errors.append(apart(w, expected))
+        assert all(np.abs(pixels(w) - other).max() > 0 for other in seen), (name, value)
+        seen.append(pixels(w))
+    assert m.GetNumberOfMeshUploads() == 1 and m.GetNumberOfFunctionUploads() == 1
+    print(f"        {name} {dict(zip(values, np.round(errors, 3)))}")
+    return errors
+
+
+def test_higher_degrees_are_nearer_to_the_integral():
+    first, second, fourth = errors_of("polynomial", "PolynomialDegree", (1, 2, 4))
+    assert fourth < second < first and fourth < first / 2
+
+
+def test_more_texels_are_nearer_to_the_integral():
+    few, more = errors_of("volume", "TableSize", ((12, 12, 4), (256, 256, 32)))
+    assert more < few / 2
+    few, more = errors_of("polynomial", "TableSize", ((12, 12, 0), (256, 256, 0)), PolynomialDegree=8)
+    assert more < few / 2
+    few, more = errors_of("cylindrical", "TableSize", ((16, 16, 16), (128, 128, 128)))
+    assert more < few / 2
+
+
+def test_lengths_of_volumes():
+    uniform, logarithmic, normalised = errors_of(
+        "volume", "TableLengths", ("uniform", "log", "log-normalised"), TableSize=(256, 256, 6))
+    assert normalised < min(uniform, logarithmic)
+
+
+def test_finer_texels_are_nearer_to_the_integral():
+    eight, full = errors_of("volume", "TableTexels", ("unorm8", "float"), TableSize=(256, 256, 64))
+    assert full < eight
+
+
+def test_alpha_of_polynomials():
+    linear, exponential = errors_of("polynomial", "PolynomialAlpha", ("linear", "exponential"))
+    assert exponential < linear / 2
+
+
+def test_planes_of_cylinders():
+    one, two = errors_of("cylindrical", "CylinderPlanes", ("one", "two"), TableSize=(64, 64, 16))
+    assert two < one
+
+
+def messages(mapper):
+    """What the mapper says is wrong, as it is said."""
+    said = []
+
+    def note(_, __, text):
+        said.append(text)
+
+    note.CallDataType = vtkCommonCore.VTK_STRING
+    mapper.AddObserver("ErrorEvent", note)
+    return said
+
+
+def test_bad_settings_are_one_error_and_can_be_mended():
+    v, w, r = table()
+    m = v.GetMapper()
+    expected = truth(r, (64, 64), field=SLANT, opacity=WAVES, color=RAMP, unit=UNIT)
+    said = messages(m)
+    # What is said names what there is.
+    cases = [
+        (dict(Integral="guess"), "polynomial"),
+        (dict(PolynomialDegree=9), "from 1 to 8, and not 9"),
+        (dict(PolynomialDegree=-3), "from 1 to 8, and not -3"),
+        (dict(TableLengths="short"), "log-normalised"),
+        (dict(TableTexels="double"), "unorm16"),
+        (dict(PolynomialAlpha="none"), "exponential"),
+        (dict(CylinderPlanes="three"), "packed"),
+        (dict(TableSize=(8, -8, 8)), "8 x -8 x 8"),
+        (dict(Integral="volume", TableSize=(1, 8, 8)), "at least 2, 2 and 3"),
+        (dict(Integral="cylindrical", TableSize=(8, 8, 6)), "multiple of 4"),
+    ]
+    for settings, word in cases:
+        good = {name: getattr(m, "Get" + name)() for name in settings}
+        for name, value in settings.items():
+            getattr(m, "Set" + name)(value)
+        assert pixels(w).max() == 0 and pixels(w).max() == 0, settings
+        assert len(said) == 1 and word in said[0], (settings, said)
+        said.clear()
+        for name, value in good.items():
+            getattr(m, "Set" + name)(value)
+        check(pixels(w), expected, what=str(settings))
+    # Tables have no room for two components.
+    g = lattice(1, field=lambda p: np.stack([SLANT(p), SLANT(p)], -1))
+    m.SetInputData(g)
+    v.GetProperty().IndependentComponentsOff()
+    m.SetIntegral("polynomial")
+    assert pixels(w).max() == 0 and len(said) == 1 and "one component" in said[0], said
+
+
+def test_setters_tell_changes_only():
+    m = vtkHaliteMapper()
+    # Those by default, in the end.
+    cases = dict(Integral=("auto", "exact"), TableSize=((8, 8, 8), (0, 0, 0)), TableLengths=("log", "log-normalised"),
+                 TableTexels=("unorm8", "float"), PolynomialDegree=(4, 2), PolynomialAlpha=("linear", "exponential"),
+                 CylinderPlanes=("packed", "two"))
+    for name, values in cases.items():
+        ask, tell = getattr(m, "Get" + name), getattr(m, "Set" + name)
+        assert ask() == values[-1], name
+        for value in values:
+            before = m.GetMTime()
+            tell(value)
+            changed = m.GetMTime()
+            tell(value)
+            assert changed > before and m.GetMTime() == changed and ask() == value, (name, value)
+            shown = " ".join(map(str, value)) if isinstance(value, tuple) else value
+            assert f"{name}: {shown}\n" in str(m), name
+
+
+if __name__ == "__main__":
+    main(globals())

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+// What is drawn: a grid, one of its arrays, where, and by which functions.
+#pragma once
+
+#include "Functions.h"
+#include "Key.h"
+#include "vtkHaliteCompatibility.h"
+
+#include "halite.h"
+
+VTK_ABI_NAMESPACE_BEGIN
+class vtkDataArray;
+class vtkUnstructuredGridBase;
+class vtkVolume;
+VTK_ABI_NAMESPACE_END
+
+struct Content
+{
+  // How the core is to work.
+  halite::Settings Settings;
+  vtkUnstructuredGridBase* Grid = nullptr;
+  halite::Renderer::Matrix Placement{};
+  vtkDataArray* Array = nullptr;
+  halite::Association Association = halite::Association::Points;
+  int Component = 0;
+  halite::TransferFunction Function;
+  // What each of these depends on.
+  Key SettingsKey, IntegralKey, MeshKey, PlacementKey, FieldKey, FunctionKey;
+
+  // What a volume shows of a grid by `array`, of which `cellFlag` says what vtkAbstractMapper::GetScalars does. Throws if there is
+  // no array, or VTK has no meaning for it.
+  Content(const halite::Settings& settings, vtkUnstructuredGridBase* grid, vtkDataArray* array, int cellFlag,
+    vtkVolume* volume, halite::OpacityConvention convention, Functions::Cache& functions);
+
+  // What a picture depends on, but for the view.
+  Key Whole() const;
+
+private:
+  void ChooseField(vtkVolume* volume, int cellFlag);
+  void ChooseFunction(vtkVolume* volume, halite::OpacityConvention convention, Functions::Cache& functions);
+};

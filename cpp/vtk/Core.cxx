@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+#include "Core.h"
+
+#include "MeshView.h"
+
+#include "vtkDataArray.h"
+
+namespace
+{
+
+// Whether another key is wanted than that which is held; then that is held no more.
+bool IsNew(Key& held, const Key& wanted)
+{
+  const bool differs = held != wanted;
+  if (differs)
+  {
+    held = Key();
+  }
+  return differs;
+}
+
+}
+
+void Core::Hold(const Content& content)
+{
+  MeshView view;
+  if (!this->Renderer || IsNew(this->SettingsKey, content.SettingsKey))
+  {
+    // The old one's memory is free before the new one takes its own.
+    this->Renderer.reset();
+    this->Renderer.reset(new halite::Renderer(content.Settings));
+    this->SettingsKey = content.SettingsKey;
+    this->IntegralKey = content.IntegralKey;
+    this->MeshKey = this->PlacementKey = this->FieldKey = this->FunctionKey = Key();
+  }
+  if (IsNew(this->IntegralKey, content.IntegralKey))
+  {
+    this->Renderer->setIntegral(content.Settings.integral);
+    this->IntegralKey = content.IntegralKey;
+  }
+  bool hasMesh = !IsNew(this->MeshKey, content.MeshKey);
+  if (hasMesh && IsNew(this->PlacementKey, content.PlacementKey))
+  {
+    hasMesh = this->Renderer->movePoints(view.Points(content.Grid), &content.Placement);
+    this->Done.Points += hasMesh;
+  }
+  if (!hasMesh)
+  {
+    this->MeshKey = this->FieldKey = Key();
+    this->Renderer->setMesh(view.Mesh(content.Grid), &content.Placement);
+    ++this->Done.Meshes;
+    this->MeshKey = content.MeshKey;
+  }
+  this->PlacementKey = content.PlacementKey;
+  if (IsNew(this->FieldKey, content.FieldKey))
+  {
+    const int n = content.Array->GetNumberOfComponents();
+    const halite::Numbers numbers = view.Numbers(content.Array, content.Component);
+    const bool isOne = numbers.count == static_cast<std::size_t>(content.Array->GetNumberOfTuples());
+    const char* name = content.Array->GetName();
+    this->Renderer->setField(
+      name ? name : "", content.Association, isOne ? 1 : n, isOne && n > 1 ? 0 : content.Component, numbers);
+    ++this->Done.Fields;
+    this->FieldKey = content.FieldKey;
+  }
+  if (IsNew(this->FunctionKey, content.FunctionKey))
+  {
+    this->Renderer->setTransferFunction(content.Function);
+    ++this->Done.Functions;
+    this->FunctionKey = content.FunctionKey;
+  }
+  this->Done.Copies += view.GetCopies();
+}
+
+bool Core::Draw(const halite::View& view, std::vector<float>& pixels, const halite::Renderer::Progress& progress)
+{
+  pixels.resize(std::size_t(4) * view.width * view.height);
+  const bool finished = this->Renderer->render(view, pixels.data(), progress);
+  ++this->Done.Frames;
+  return finished;
+}
+
+halite::Statistics Core::GetStatistics() const
+{
+  return this->Renderer ? this->Renderer->statistics() : halite::Statistics();
+}

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+// The core's renderer, which is handed only what it does not hold yet.
+#pragma once
+
+#include "Content.h"
+#include "Key.h"
+
+#include "vtkType.h"
+
+#include <memory>
+#include <string>
+#include <vector>
+
+class Core
+{
+public:
+  // How often: it drew; something was handed over; an array's layout forced a copy.
+  struct Counts
+  {
+    vtkIdType Frames = 0, Meshes = 0, Points = 0, Fields = 0, Functions = 0, Copies = 0;
+  };
+  const Counts& GetCounts() const { return this->Done; }
+
+  // Holds this from now on. What throws half way is not held, and what follows from it neither.
+  void Hold(const Content& content);
+
+  // Draws what is held, as halite::Renderer does: false if `progress` ended it.
+  bool Draw(const halite::View& view, std::vector<float>& pixels, const halite::Renderer::Progress& progress);
+
+  // Of what drew last; nothing before that.
+  halite::Statistics GetStatistics() const;
+
+private:
+  std::unique_ptr<halite::Renderer> Renderer;
+  Key SettingsKey, IntegralKey, MeshKey, PlacementKey, FieldKey, FunctionKey;
+  Counts Done;
+};

@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+#include "vtkHaliteMapperInternals.h"
+
+#include "Peeling.h"
+
+#include "vtkCamera.h"
+#include "vtkCommand.h"
+#include "vtkDataArray.h"
+#include "vtkOpenGLRenderPass.h"
+#include "vtkOpenGLRenderWindow.h"
+#include "vtkRenderer.h"
+#include "vtkUnstructuredGridBase.h"
+#include "vtkVolume.h"
+#include "vtkVolumeCollection.h"
+#include "vtkVolumeProperty.h"
+
+#include <algorithm>
+
+VTK_ABI_NAMESPACE_BEGIN
+
+void vtkHaliteMapper::Internals::Say(const std::string& what)
+{
+  if (this->Errors.insert(what).second)
+  {
+    vtkErrorWithObjectMacro(&this->Self, << what);
+  }
+}
+
+void vtkHaliteMapper::Internals::Remark(const char* what)
+{
+  if (this->Remarks.insert(what).second)
+  {
+    vtkWarningWithObjectMacro(&this->Self, << what);
+  }
+}
+
+Presenter& vtkHaliteMapper::Internals::PresenterOf(vtkOpenGLRenderWindow* window)
+{
+  for (Presenter& p : this->Presenters)
+  {
+    if (p.GetWindow() == window)
+    {
+      return p;
+    }
+  }
+  this->Presenters.emplace_back(window);
+  return this->Presenters.back();
+}
+
+vtkHaliteMapper::Internals::Frame& vtkHaliteMapper::Internals::FrameOf(vtkRenderer* renderer, vtkVolume* volume)
+{
+  const int eye = renderer->GetActiveCamera()->GetLeftEye();
+  this->Frames.remove_if([](const Frame& f) { return !f.Renderer || !f.Volume; });
+  for (Frame& f : this->Frames)
+  {
+    if (f.Renderer == renderer && f.Volume == volume && f.Eye == eye)
+    {
+      return f;
+    }
+  }
+  this->Frames.emplace_back();
+  Frame& f = this->Frames.back();
+  f.Renderer = renderer;
+  f.Volume = volume;
+  f.Eye = eye;
+  return f;
+}
+
+void vtkHaliteMapper::Internals::RemarkOn(vtkVolumeProperty* property)
+{
+  if (property->GetShade(0))
+  {
+    this->Remark("Halite does not shade: the volume emits light and absorbs it");
+  }
+  // With 2D functions, VTK says that there is gradient opacity.
+  if (property->GetTransferFunctionMode() == vtkVolumeProperty::TF_2D)
+  {
+    this->Remark("Halite does not draw 2D transfer functions; the 1D functions are used");
+  }
+  else if (property->HasGradientOpacity(0) && !property->GetDisableGradientOpacity(0))
+  {
+    this->Remark("Halite does not draw gradient opacity");
+  }
+}
+
+Content vtkHaliteMapper::Internals::Choose(vtkUnstructuredGridBase* grid, vtkVolume* volume)
+{
+  Clock clock(this->Self.PrepareTime);
+  halite::Settings settings;
+  settings.threads = static_cast<std::size_t>(this->Self.NumberOfThreads);
+  settings.device = Text(this->Self.Device);
+  settings.engine = Text(this->Self.Engine);
+  halite::Integral& integral = settings.integral;
+  integral.form = Text(this->Self.Integral);
+  std::copy_n(this->Self.TableSize, 3, integral.table.begin());
+  integral.lengths = Text(this->Self.TableLengths);
+  integral.texels = Text(this->Self.TableTexels);
+  integral.degree = this->Self.PolynomialDegree;
+  integral.alpha = Text(this->Self.PolynomialAlpha);
+  integral.planes = Text(this->Self.CylinderPlanes);
+  int cellFlag = 0;
+  vtkDataArray* array = vtkAbstractMapper::GetScalars(
+    grid, this->Self.ScalarMode, this->Self.ArrayAccessMode, this->Self.ArrayId, this->Self.ArrayName, cellFlag);
+  const auto convention = this->Self.OpacityConvention == vtkHaliteMapper::OPACITY
+    ? halite::OpacityConvention::Opacity
+    : halite::OpacityConvention::Extinction;
+  return Content(settings, grid, array, cellFlag, volume, convention, this->Knots);
+}
+
+bool vtkHaliteMapper::Internals::Draw(
+  const Content& content, const halite::View& view, vtkOpenGLRenderWindow* window, std::vector<float>& pixels)
+{
+  {
+    Clock clock(this->Self.PrepareTime);
+    this->Core.Hold(content);
+  }
+  Clock clock(this->Self.CoreTime);
+  const bool finished = this->Core.Draw(view, pixels, [&](double share) {
+    this->Self.InvokeEvent(vtkCommand::VolumeMapperRenderProgressEvent, &share);
+    return !window->CheckAbortStatus();
+  });
+  // Handlers of events may have drawn elsewhere.
+  window->MakeCurrent();
+  return finished;
+}
+
+bool vtkHaliteMapper::Internals::Show(
+  const Content& content, SceneView& view, const Viewport& viewport, Presenter& presenter, Frame& frame)
+{
+  vtkRenderer* renderer = frame.Renderer;
+  const int width = static_cast<int>(view.View.width), height = static_cast<int>(view.View.height);
+  std::vector<float> depths;
+  // Where nothing was drawn and nothing kept, nothing ends rays.
+  if (renderer->GetNumberOfPropsRendered() > 0 || renderer->GetPreserveDepthBuffer() || !renderer->GetErase())
+  {
+    Clock clock(this->Self.DepthTime);
+    Presenter::ReadDepths(presenter.GetWindow(), viewport, width, height, depths);
+    if (std::all_of(depths.begin(), depths.end(), [](float d) { return d >= 1; }))
+    {
+      depths.clear();
+    }
+  }
+  const bool isDrawn = frame.Texture && frame.Depths == depths;
+  if (!isDrawn)
+  {
+    frame.Texture = nullptr;
+    frame.Layers.Clear();
+    frame.Depths.swap(depths);
+    view.View.depths = frame.Depths.empty() ? nullptr : frame.Depths.data();
+    if (!this->Draw(content, view.View, presenter.GetWindow(), this->Pixels))
+    {
+      return false;
+    }
+  }
+  Clock clock(this->Self.PresentTime);
+  if (!isDrawn)
+  {
+    frame.Texture = presenter.Upload(width, height, this->Pixels);
+  }
+  presenter.Present(frame.Texture, viewport);
+  return true;
+}
+
+bool vtkHaliteMapper::Internals::Peel(
+  const Content& content, SceneView& view, Presenter& presenter, Frame& frame, vtkOpenGLRenderPass* pass)
+{
+  vtkRenderer* renderer = frame.Renderer;
+  vtkVolume* volume = frame.Volume;
+  Peeling& peeling = presenter.GetPeeling();
+  const int width = static_cast<int>(view.View.width), height = static_cast<int>(view.View.height);
+  std::vector<Parts> parts;
+  {
+    Clock clock(this->Self.DepthTime);
+    peeling.Ask(pass, &this->Self, volume, width, height, parts);
+  }
+  const bool isOutside = peeling.IsOutside();
+  if (isOutside)
+  {
+    frame.Kept.clear();
+    frame.Layers.DropUnused();
+  }
+  const bool isComplete = frame.Layers.Complete(parts, [&](const std::vector<float>& ends, std::vector<float>& pixels) {
+    view.View.depths = ends.data();
+    return this->Draw(content, view.View, presenter.GetWindow(), pixels);
+  });
+  if (!isComplete)
+  {
+    return false;
+  }
+  Clock clock(this->Self.PresentTime);
+  std::vector<float> kept, front = frame.Layers.PictureOf(parts, &Parts::Front);
+  const std::vector<float> back = frame.Layers.PictureOf(parts, &Parts::Back);
+  kept.swap(frame.Kept);
+  // VTK's layers have 8 bits, and what is written less often is rounded less often. Other volumes would have to go between.
+  if (isOutside && volume->GetMapper() == &this->Self && renderer->GetVolumes()->GetNumberOfItems() == 1 &&
+    renderer->GetMaximumNumberOfPeels() > 0)
+  {
+    frame.Kept.swap(front);
+  }
+  const auto textureOf = [&](const std::vector<float>& pixels) {
+    return pixels.empty() ? presenter.Upload(1, 1, { 0, 0, 0, 0 }) : presenter.Upload(width, height, pixels);
+  };
+  peeling.Answer(pass, &this->Self, volume, textureOf(kept), textureOf(front), textureOf(back));
+  return true;
+}
+
+void vtkHaliteMapper::Internals::PutOff(vtkRenderer* renderer, vtkVolume* volume)
+{
+  const bool waits = std::any_of(this->Lates.begin(), this->Lates.end(),
+    [&](const Late& l) { return l.Renderer == renderer && l.Volume == volume; });
+  if (!waits)
+  {
+    const unsigned long observer =
+      renderer->AddObserver(vtkCommand::EndEvent, &this->Self, &vtkHaliteMapper::DrawLate);
+    this->Lates.push_back({ renderer, volume, observer });
+  }
+}
+
+VTK_ABI_NAMESPACE_END

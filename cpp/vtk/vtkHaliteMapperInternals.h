@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+// What the mapper keeps between frames, and the steps of one.
+#pragma once
+
+#include "Content.h"
+#include "Core.h"
+#include "Key.h"
+#include "Layers.h"
+#include "Presenter.h"
+#include "SceneView.h"
+#include "vtkHaliteCompatibility.h"
+#include "vtkHaliteMapper.h"
+
+#include "vtkSmartPointer.h"
+#include "vtkTextureObject.h"
+#include "vtkWeakPointer.h"
+
+#include <chrono>
+#include <list>
+#include <set>
+#include <string>
+#include <vector>
+
+VTK_ABI_NAMESPACE_BEGIN
+
+class vtkOpenGLRenderPass;
+class vtkOpenGLRenderWindow;
+class vtkRenderer;
+class vtkUnstructuredGridBase;
+class vtkVolume;
+class vtkVolumeProperty;
+
+struct vtkHaliteMapper::Internals
+{
+  // Adds its own life to a time, in seconds.
+  class Clock
+  {
+  public:
+    explicit Clock(double& seconds)
+      : Seconds(seconds)
+      , Start(std::chrono::steady_clock::now())
+    {
+    }
+    ~Clock() { this->Seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - this->Start).count(); }
+
+  private:
+    double& Seconds;
+    std::chrono::steady_clock::time_point Start;
+  };
+
+  // What was drawn for a renderer, a volume and an eye: a picture, or those of rays up to translucent surfaces.
+  struct Frame
+  {
+    vtkWeakPointer<vtkRenderer> Renderer;
+    vtkWeakPointer<vtkVolume> Volume;
+    int Eye = 0;
+    Key Pictured;
+    std::vector<float> Depths;
+    vtkSmartPointer<vtkTextureObject> Texture;
+    ::Layers Layers;
+    // Before the first of these surfaces, and not drawn yet.
+    std::vector<float> Kept;
+  };
+
+  // What is to be drawn once a renderer has finished.
+  struct Late
+  {
+    vtkWeakPointer<vtkRenderer> Renderer;
+    vtkWeakPointer<vtkVolume> Volume;
+    unsigned long Observer = 0;
+  };
+
+  static std::string Text(const char* s) { return s ? s : ""; }
+
+  vtkHaliteMapper& Self;
+  ::Core Core;
+  Functions::Cache Knots;
+  std::list<Frame> Frames;
+  std::list<Presenter> Presenters;
+  // What failed since something was drawn, and for what: nothing is tried, or said, twice.
+  Key Failed;
+  std::set<std::string> Errors;
+  std::set<std::string> Remarks;
+  std::vector<float> Pixels;
+  std::string Adapter;
+  std::list<Late> Lates;
+  bool DrawsLate = false;
+
+  explicit Internals(vtkHaliteMapper& self)
+    : Self(self)
+  {
+  }
+
+  // An error or a warning, each once.
+  void Say(const std::string& what);
+  void Remark(const char* what);
+  // What of the property is not drawn.
+  void RemarkOn(vtkVolumeProperty* property);
+
+  Presenter& PresenterOf(vtkOpenGLRenderWindow* window);
+  Frame& FrameOf(vtkRenderer* renderer, vtkVolume* volume);
+  Content Choose(vtkUnstructuredGridBase* grid, vtkVolume* volume);
+  // Draws once the renderer has finished.
+  void PutOff(vtkRenderer* renderer, vtkVolume* volume);
+
+  // These are false if what they draw was given up. By the core:
+  bool Draw(const Content& content, const halite::View& view, vtkOpenGLRenderWindow* window, std::vector<float>& pixels);
+  // Into the window, as one picture:
+  bool Show(const Content& content, SceneView& view, const Viewport& viewport, Presenter& presenter, Frame& frame);
+  // Into the layers of a pass of depth peeling:
+  bool Peel(const Content& content, SceneView& view, Presenter& presenter, Frame& frame, vtkOpenGLRenderPass* pass);
+};
+
+VTK_ABI_NAMESPACE_END

@@ -1,0 +1,194 @@
+//! Pieces to one mesh: points, and the arrays of points and cells.
+
+use super::head::{Piece, Section};
+use super::topology::Topology;
+use crate::error::{Error, Result};
+use crate::io::data::{DataArray, Store};
+use crate::io::number::{Number, with_kind};
+use crate::io::{Progress, validated};
+use crate::mesh::{Array, Mesh};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::collections::{BTreeSet, HashMap};
+use std::path::Path;
+
+/// A grid whose head has been read.
+pub(super) struct Grid<'a> {
+    pub(super) path: &'a Path,
+    pub(super) stores: Vec<Store>,
+    pub(super) pieces: Vec<Piece>,
+    pub(super) progress: Progress<'a>,
+}
+
+impl Grid<'_> {
+    /// Reads the arrays, and makes one mesh of all pieces.
+    pub(super) fn mesh(&self) -> Result<Mesh> {
+        let points = self.pieces.iter().fold(0u64, |sum, piece| sum.saturating_add(piece.points));
+        if points >= u64::from(u32::MAX) {
+            let what = format!("{points} points are more than Halite can index (2^32 - 2)");
+            return Err(Error::unsupported(self.path, what));
+        }
+        let data = || rayon::join(|| self.data(Section::PointData), || self.data(Section::CellData));
+        let (topology, (points, (point_arrays, cell_arrays))) =
+            rayon::join(|| self.topology(), || rayon::join(|| self.points(), data));
+        let (points, Topology { cells, polyhedra }) = (points?, topology?);
+        let mesh = Mesh::new(points, cells, point_arrays?, cell_arrays?);
+        let mesh = mesh.and_then(|mesh| match polyhedra {
+            Some(polyhedra) => mesh.with_polyhedra(polyhedra),
+            None => Ok(mesh),
+        });
+        validated(self.path, mesh)
+    }
+
+    pub(super) fn store(&self, piece: &Piece) -> &Store {
+        &self.stores[piece.store]
+    }
+
+    pub(super) fn malformed(&self, piece: &Piece, what: impl Into<String>) -> Error {
+        Error::malformed(&self.store(piece).path, what)
+    }
+
+    fn points(&self) -> Result<Vec<DVec3>> {
+        let read = |(i, piece): (usize, &Piece)| {
+            let fail = |what: &str| self.malformed(piece, format!("the Points of piece {i} {what}"));
+            match piece.arrays(Section::Points).first() {
+                None if piece.points == 0 => Ok(Vec::new()),
+                None => Err(fail("are missing")),
+                Some(array) if array.components != 3 => {
+                    Err(fail(&format!("have {} components, not 3", array.components)))
+                }
+                Some(array) => self.floats(piece, array, piece.points),
+            }
+        };
+        let parts = self.pieces.par_iter().enumerate().map(read).collect::<Result<Vec<_>>>()?;
+        Ok(joined(parts).par_chunks_exact(3).map(DVec3::from_slice).collect())
+    }
+
+    /// Reads indices of any number type, all that there are or so many. `check` turns each into what is kept, or `explain` says what
+    /// is wrong with it: it gets the place of the number, and its value if it is a whole number from 0 up.
+    pub(super) fn indices<U: bytemuck::Pod>(
+        &self,
+        piece: &Piece,
+        array: &DataArray,
+        count: Option<u64>,
+        check: impl Fn(u64) -> Option<U> + Sync,
+        explain: impl Fn(usize, Option<u64>) -> String + Sync,
+    ) -> Result<Vec<U>> {
+        let contents = self.store(piece).array(array)?;
+        let count = count.unwrap_or_else(|| contents.count());
+        contents.read(count, &self.progress, &|first, numbers, out| {
+            let mut out = bytemuck::cast_slice_mut::<u8, U>(out).iter_mut();
+            with_kind!(array.kind, T => for (i, number) in bytemuck::cast_slice::<u8, T>(numbers).iter().enumerate() {
+                let index = number.index();
+                let kept = index.and_then(&check).ok_or_else(|| explain(first + i, index))?;
+                if let Some(out) = out.next() {
+                    *out = kept;
+                }
+            });
+            Ok(())
+        })
+    }
+
+    /// Reads numbers of any type as f64.
+    fn floats(&self, piece: &Piece, array: &DataArray, tuples: u64) -> Result<Vec<f64>> {
+        let count = tuples.saturating_mul(array.components as u64);
+        self.store(piece).array(array)?.read(count, &self.progress, &|_, numbers, out| {
+            let out = bytemuck::cast_slice_mut::<u8, f64>(out);
+            with_kind!(array.kind, T => for (number, out) in bytemuck::cast_slice::<u8, T>(numbers).iter().zip(out) {
+                *out = number.float();
+            });
+            Ok(())
+        })
+    }
+
+    /// Reads bits, the highest of a byte first, as 0 and 1; numbers of another type as what a byte holds of them.
+    fn bits(&self, piece: &Piece, array: &DataArray, tuples: u64) -> Result<Vec<u8>> {
+        if !array.bits {
+            return Ok(self.floats(piece, array, tuples)?.into_iter().map(|x| x as u8).collect());
+        }
+        let count = tuples.saturating_mul(array.components as u64);
+        let bytes: Vec<u8> =
+            self.store(piece).array(array)?.read(count.div_ceil(8), &self.progress, &|_, numbers, out| {
+                out.copy_from_slice(numbers);
+                Ok(())
+            })?;
+        Ok((0..count as usize).map(|i| bytes[i / 8] >> (7 - i % 8) & 1).collect::<Vec<u8>>())
+    }
+
+    /// The arrays of point or cell data that all pieces have, pieces with no points (or cells) aside.
+    fn data(&self, section: Section) -> Result<Vec<Array>> {
+        let filled: Vec<&Piece> = self.pieces.iter().filter(|piece| piece.tuples(section) > 0).collect();
+        let filled = if filled.is_empty() { self.pieces.iter().take(1).collect() } else { filled };
+        let found: Vec<HashMap<Key<'_>, &DataArray>> =
+            filled.iter().map(|piece| keyed(piece.arrays(section)).collect()).collect();
+        let mut lost: BTreeSet<Key<'_>> = found.iter().flat_map(|arrays| arrays.keys().copied()).collect();
+        let mut kept = Vec::new();
+        for (key, array) in filled.iter().take(1).flat_map(|piece| keyed(piece.arrays(section))) {
+            let parts = filled.iter().zip(&found).map(|(piece, arrays)| {
+                let part = arrays.get(&key).filter(|part| part.components == array.components)?;
+                Some((*piece, *part))
+            });
+            if let Some(parts) = parts.collect::<Option<Vec<_>>>() {
+                lost.remove(&key);
+                kept.push(parts);
+            }
+        }
+        if !lost.is_empty() {
+            let names: Vec<&str> = lost.iter().map(|key| key.0).collect();
+            tracing::warn!(
+                "{}: {} arrays {names:?} are left out: not every piece has them, with as many components",
+                self.path.display(),
+                section.name()
+            );
+        }
+        kept.par_iter().map(|parts| self.data_array(section, parts)).collect()
+    }
+
+    /// One array of its parts in the pieces.
+    fn data_array(&self, section: Section, parts: &[(&Piece, &DataArray)]) -> Result<Array> {
+        let Some((_, first)) = parts.first() else {
+            return Err(Error::malformed(self.path, "no piece has arrays"));
+        };
+        let values = if parts.iter().any(|(_, part)| part.bits) {
+            let bits = parts.iter().map(|(piece, part)| self.bits(piece, part, piece.tuples(section)));
+            u8::values(joined(bits.collect::<Result<Vec<_>>>()?))
+        } else if parts.iter().all(|(_, part)| part.kind == first.kind) {
+            with_kind!(first.kind, T => {
+                let read = |(piece, part): &(&Piece, &DataArray)| {
+                    let count = piece.tuples(section).saturating_mul(part.components as u64);
+                    self.store(piece).array(part)?.read(count, &self.progress, &|_, numbers, out| {
+                        out.copy_from_slice(numbers);
+                        Ok(())
+                    })
+                };
+                T::values(joined(parts.iter().map(read).collect::<Result<Vec<_>>>()?))
+            })
+        } else {
+            let (path, name) = (self.path.display(), &first.name);
+            tracing::warn!(
+                "{path}: {} array \"{name}\" is read as Float64: its type differs from piece to piece",
+                first.section
+            );
+            let floats = parts.iter().map(|(piece, part)| self.floats(piece, part, piece.tuples(section)));
+            f64::values(joined(floats.collect::<Result<Vec<_>>>()?))
+        };
+        Ok(Array { name: first.name.clone(), components: first.components, values })
+    }
+}
+
+/// What identifies an array in each piece: its name, and how many arrays of that name come before.
+type Key<'a> = (&'a str, usize);
+
+fn keyed(arrays: &[DataArray]) -> impl Iterator<Item = (Key<'_>, &DataArray)> {
+    let mut seen = HashMap::new();
+    arrays.iter().map(move |array| {
+        let before = seen.entry(array.name.as_str()).or_insert(0);
+        *before += 1;
+        ((array.name.as_str(), *before), array)
+    })
+}
+
+/// One vector of several, without a copy if there is only one.
+pub(super) fn joined<T: Copy>(mut parts: Vec<Vec<T>>) -> Vec<T> {
+    if parts.len() == 1 { parts.swap_remove(0) } else { parts.concat() }
+}

@@ -1,0 +1,132 @@
+use super::*;
+use crate::transfer::{Convention, Emission};
+use crate::view::Projection;
+
+const SCENE: &str = r#"{
+    "mesh": "sub/ball.vtu", "scalars": {"name": "s", "component": 1, "association": "cell"},
+    "color": [[0, 0.2, 0.3, 0.8], [1, 0.9, 0.3, 0.1]], "opacity": [[0, 0], [1, 0.5]], "unit_distance": 0.1,
+    "camera": {"position": [0, 0, 10], "focal_point": [0, 0, 0], "view_up": [0, 1, 0]},
+    "size": [3, 5]
+}"#;
+
+/// [`SCENE`] with `from` replaced by `to`.
+fn open(from: &str, to: &str) -> Result<Scene> {
+    assert!(SCENE.contains(from), "{from}");
+    let dir = tempfile::tempdir().unwrap();
+    let depths = (0..15).flat_map(|i| (i as f32).to_le_bytes());
+    let header = b"\x93NUMPY\x01\x00\x76\x00{'descr': '<f4', 'fortran_order': False, 'shape': (5, 3), }";
+    let mut npy = header.to_vec();
+    npy.resize(127, b' ');
+    npy.push(b'\n');
+    npy.extend(depths);
+    std::fs::write(dir.path().join("depth.npy"), npy).unwrap();
+    let path = dir.path().join("scene.json");
+    std::fs::write(&path, SCENE.replace(from, to)).unwrap();
+    let scene = Scene::open(&path)?;
+    assert_eq!(scene.mesh, dir.path().join("sub/ball.vtu"));
+    Ok(scene)
+}
+
+/// [`SCENE`] with more keys.
+fn with(keys: &str) -> Result<Scene> {
+    open("\"mesh\"", &format!("{keys}, \"mesh\""))
+}
+
+#[test]
+fn defaults() {
+    let scene = open("", "").unwrap();
+    let component = Some(Component::Index(1));
+    let scalars = Scalars { name: "s".into(), association: Some(Association::Cell), component };
+    assert_eq!(scene.scalars, scalars);
+    assert_eq!(scene.camera.projection, Projection::Perspective { view_angle: 30.0 });
+    assert_eq!((scene.transfer.convention(), scene.transfer.emission()), Default::default());
+    assert!(scene.transfer.clamp());
+    let (view, backdrop) = scene.view().unwrap();
+    assert_eq!((view.size(), view.blend(), backdrop), ([3, 5], Blend::Composite, None));
+    assert_eq!(view.ray(1, 2).t_max, f64::INFINITY);
+}
+
+#[test]
+fn every_key_is_known() {
+    let scene = with(
+        r#""cells": "tets", "clamp": false, "convention": "opacity", "emission": "direct", "emission_scale": 0.3,
+        "gradient_array": "g", "pixel_offset": [0.1, 0.2], "clipping_range": [0.5, 50], "blend": "maximum",
+        "clipping_planes": [{"origin": [0, 0, 1], "normal": [0, 0, -1]}], "background": [0, 0.5, 1], "tol": 1e-9,
+        "truth_of": "x", "engine": "traverse", "device": "cpu", "integral": {"kind": "exact"}, "projection": {},
+        "depth": {"file": "depth.npy", "kind": "ray"}, "opaque": []"#,
+    )
+    .unwrap();
+    assert_eq!(scene.transfer.emission(), Emission::Direct { scale: 0.3 });
+    assert_eq!(scene.transfer.convention(), Convention::Opacity);
+    assert!(!scene.transfer.clamp());
+    assert_eq!(scene.engine.as_deref(), Some("traverse"));
+    let (view, _) = scene.view().unwrap();
+    assert_eq!(view.blend(), Blend::Maximum);
+    let ray = view.ray(2, 4);
+    assert_eq!(ray.t_max, 14.0);
+    assert!((ray.t_min * -ray.direction.z - 9.0).abs() < 1e-12);
+    let parallel = open("\"camera\": {", "\"camera\": {\"projection\": \"parallel\", \"parallel_scale\": 2, ").unwrap();
+    assert_eq!(parallel.camera.projection, Projection::Parallel { parallel_scale: 2.0 });
+}
+
+#[test]
+fn opaque_objects_end_rays() {
+    let scene = with(
+        r#""background": [0.5, 0.5, 0.5], "depth": {"file": "depth.npy", "kind": "eye"}, "opaque": [
+        {"type": "plane", "point": [0, 0, -2], "normal": [0, 0, 3], "color": [0, 0, 1]},
+        {"type": "sphere", "center": [0, 0, 0], "radius": 1, "color": [1, 0, 0]}]"#,
+    )
+    .unwrap();
+    let (view, backdrop) = scene.view().unwrap();
+    let (mut sphere, backdrop) = (scene.clone(), backdrop.unwrap());
+    // Depth 7, before the sphere; 14, behind the plane at 12.
+    assert_eq!((view.ray(1, 2).t_max, backdrop[7]), (7.0, [0.5; 3]));
+    let ray = view.ray(2, 4);
+    assert!((ray.t_max * -ray.direction.z - 12.0).abs() < 1e-12);
+    assert_eq!(backdrop[14], [0.0, 0.0, 1.0]);
+    sphere.depth = None;
+    let (view, backdrop) = sphere.view().unwrap();
+    assert!((view.ray(1, 2).t_max - 9.0).abs() < 1e-12);
+    assert_eq!(backdrop.unwrap()[7], [1.0, 0.0, 0.0]);
+    // From inside, its far side.
+    sphere.camera.position.z = 0.5;
+    assert!((sphere.view().unwrap().0.ray(1, 2).t_max - 1.5).abs() < 1e-12);
+}
+
+#[test]
+fn mistakes_are_named() {
+    for (from, to, parts) in [
+        ("\"mesh\"", "\"mash\"", vec!["mash", "unknown field", "`mesh`"]),
+        ("\"view_up\"", "\"up\"", vec!["camera", "unknown field `up`"]),
+        ("[1, 0.9, 0.3, 0.1]", "[1, 0.9, 0.3]", vec!["color[1]", "length 3"]),
+        ("[1, 0.9, 0.3, 0.1]", "[1, 0.9, 0.3, 0.1, 1]", vec!["color[1]"]),
+        ("\"s\"", "7", vec!["scalars.name", "7"]),
+        ("\"component\": 1", "\"component\": \"x\"", vec!["scalars.component", "magnitude"]),
+        ("\"cell\"", "\"edge\"", vec!["scalars.association", "edge", "point"]),
+        (", \"opacity\": [[0, 0], [1, 0.5]]", "", vec!["color but no opacity"]),
+        ("\"color\": [[0, 0.2, 0.3, 0.8], [1, 0.9, 0.3, 0.1]],", "", vec!["opacity but no color"]),
+        ("\"unit_distance\": 0.1,", "", vec!["missing field `unit_distance`"]),
+        ("\"unit_distance\": 0.1", "\"unit_distance\": 0", vec!["unit distance"]),
+        ("[[0, 0], [1, 0.5]]", "[[1, 0], [0, 0.5]]", vec!["ascend"]),
+        ("[3, 5]", "[0, 5]", vec!["0x5"]),
+        ("[3, 5]", "[3.5, 5]", vec!["size"]),
+        ("\"view_up\": [0, 1, 0]", "\"view_up\": [0, 0, 1]", vec!["view up"]),
+        ("\"size\"", "\"engine\": 1, \"size\"", vec!["engine"]),
+        ("\"size\"", "\"emission_scale\": 1, \"size\"", vec!["emission_scale"]),
+        ("\"size\"", "\"background\": [0, 0, 255], \"size\"", vec!["background", "255"]),
+        ("\"size\"", "\"clipping_range\": [0, 1], \"size\"", vec!["clipping range"]),
+        ("\"size\"", "\"depth\": {\"file\": \"no.npy\"}, \"size\"", vec!["no.npy"]),
+        ("\"size\"", "\"opaque\": [{\"type\": \"cone\"}], \"size\"", vec!["opaque[0]", "cone"]),
+        ("\"size\"", "\"opaque\": [{\"type\": \"sphere\", \"radius\": 1}], \"size\"", vec!["opaque[0]", "center"]),
+        ("[3, 5]\n}", "[3, 5]\n} x", vec!["after the scene"]),
+        ("[3, 5]\n}", "[3, 5]", vec!["EOF"]),
+    ] {
+        let message = open(from, to).unwrap_err().to_string();
+        assert!(parts.iter().all(|p| message.contains(p)), "{parts:?}: {message}");
+    }
+    let widgets = with(r#""widgets": [{"type": "uniform"}]"#).unwrap_err();
+    assert!(matches!(&widgets, Error::Unsupported { what, .. } if what.contains("widgets")), "{widgets}");
+    let mut scene = with(r#""depth": {"file": "depth.npy", "kind": "ray"}"#).unwrap();
+    scene.size = [5, 3];
+    assert!(scene.view().unwrap_err().to_string().contains("3x5"));
+}

@@ -1,0 +1,112 @@
+//! Pictures of the device against those of the walk on the CPU.
+
+use super::draw;
+use super::random::{Random, meshes, random_transfer, random_view};
+use crate::error::Error;
+use crate::field::{Association, Component, Field};
+use crate::gpu::DeviceChoice;
+use crate::gpu::testing::choice;
+use crate::mesh::cells::Tetrahedra;
+use crate::mesh::generate;
+use crate::render::Renderer;
+use crate::view::{Blend, Camera, Projection, View};
+use glam::DVec3;
+
+/// Draws `frames` frames of each of `rounds` times eight meshes on the device and on the CPU, and compares them. Where a ray grazes
+/// the surface that a step of the function makes, the last digit of a value decides: one pixel in 100,000 may differ by more.
+fn compare(rounds: usize, frames: usize, size: [u32; 2], seed: u64) {
+    let Some(choice) = choice() else { return };
+    let mut random = Random(seed);
+    let (mut beyond, mut pixels) = (0, 0);
+    let all: Vec<_> = (0..rounds).flat_map(|_| meshes(&mut random)).collect();
+    for (name, mesh) in all {
+        let mut pair = [choice.clone(), DeviceChoice::Cpu].map(|c| Renderer::with_device(0, c).unwrap());
+        for r in &mut pair {
+            r.set_mesh(&mesh, Tetrahedra::new(&mesh).unwrap());
+        }
+        for frame in 0..frames {
+            let array = ["scalar", "pair", "rgba"][random.below(3)];
+            let association = [Association::Point, Association::Cell][random.below(2)];
+            let field = Field::new(&mesh, array, Some(association), Component::All).unwrap();
+            let transfer = random_transfer(&mut random, frame % 5 == 4);
+            let blend = if random.below(5) == 0 { Blend::Maximum } else { Blend::Composite };
+            let view = random_view(&mut random, size).with_blend(blend);
+            let [got, want] = pair.each_mut().map(|r| {
+                r.set_field(&field).unwrap();
+                r.set_transfer(&transfer);
+                draw(r, &view)
+            });
+            assert_eq!(pair[0].stats().device, "gpu");
+            let mut apart = 0.0;
+            // Where two places have the largest opacity but for rounding, either's colour is right.
+            let compared = if blend == Blend::Maximum && array != "scalar" { 3..4 } else { 0..4 };
+            for (g, w) in got.pixels.iter().zip(&want.pixels) {
+                let d = compared.clone().fold(0.0, |m, k| f32::max(m, (g[k] - w[k]).abs() / w[k].max(1.0)));
+                assert!(g.iter().all(|v| v.is_finite()), "{name} {frame}: {g:?}, not {w:?}");
+                (beyond, pixels) = (beyond + usize::from(d > 2e-5), pixels + 1);
+                apart = f32::max(apart, d);
+            }
+            let what =
+                format!("{apart:.2e}: {name}, frame {frame}: {array} {association:?} {blend:?} {:?}", view.camera());
+            if apart > 2e-5 {
+                eprintln!("{what} {transfer:?}");
+            }
+            assert!(apart <= 2e-4, "{what}");
+        }
+    }
+    eprintln!("{beyond} of {pixels} pixels are more than 2e-5 apart");
+    assert!(100_000 * beyond <= pixels);
+}
+
+#[test]
+fn the_twins_agree() {
+    compare(1, 4, [40, 36], 11);
+}
+
+#[test]
+fn the_twins_agree_a_thousand_times() {
+    if is_long() {
+        compare(25, 5, [40, 40], 17);
+    }
+}
+
+/// Whether tests that take minutes were asked for.
+fn is_long() -> bool {
+    let asked = std::env::var_os("HALITE_LONG").is_some();
+    if !asked {
+        eprintln!("not run: HALITE_LONG is not set");
+    }
+    asked
+}
+
+#[test]
+fn ten_million_tetrahedra_are_drawn() {
+    if !is_long() {
+        return;
+    }
+    let Some(choice) = choice() else { return };
+    let mesh = generate::tetrahedra(119);
+    let mut renderer = Renderer::with_device(0, choice).unwrap();
+    renderer.set_mesh(&mesh, Tetrahedra::new(&mesh).unwrap());
+    renderer.set_field(&Field::new(&mesh, "s", None, Component::All).unwrap()).unwrap();
+    let mut random = Random(4);
+    renderer.set_transfer(&random_transfer(&mut random, false));
+    let camera = Camera {
+        position: DVec3::new(3.0, 2.5, 2.0),
+        focal_point: DVec3::ZERO,
+        view_up: DVec3::Z,
+        projection: Projection::Perspective { view_angle: 40.0 },
+    };
+    let view = View::new(camera, [256, 256]).unwrap();
+    let got = draw(&mut renderer, &view);
+    eprintln!("{:#?}", renderer.stats());
+    draw(&mut renderer, &view);
+    eprintln!("again {} ms", renderer.stats().frame_ms);
+    renderer.device().unwrap();
+    renderer.draw_on_cpu(&Error::Render("to compare".into()));
+    let want = draw(&mut renderer, &view);
+    eprintln!("cpu {} ms", renderer.stats().frame_ms);
+    let apart =
+        got.pixels.iter().flatten().zip(want.pixels.iter().flatten()).fold(0.0, |m: f32, (g, w)| m.max((g - w).abs()));
+    assert!(apart <= 2e-5, "{apart:e}");
+}
