@@ -4,63 +4,39 @@
 //! 2. These are sorted.
 //! 3. Batch by batch, in that order, `project` (compute) makes a record of each cell, and the records are drawn.
 
-use super::frame::{FAR, FILLED, Frame, Limits, Seen, filled};
+mod drawing;
+mod ordering;
+mod program;
+
+use super::frame::{Seen, filled};
 use super::record::Layout;
-use super::{Compositing, Counts, Fragments, Order, Switches, Target, Thickness};
+use super::{Counts, Fragments, Switches, Target};
 use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Values};
 use crate::gpu::buffers::{Buffer, Chunks};
-use crate::gpu::clock::{CLOCKS, Clock};
-use crate::gpu::function::{self, LINES_ACROSS};
-use crate::gpu::raster::{self, Readback, Slot, Texture};
-use crate::gpu::shader::{self, Array, Variant};
+use crate::gpu::raster::{self, Slot, Texture};
+use crate::gpu::shader::{Array, Variant};
 use crate::gpu::sort::Sorter;
-use crate::gpu::table::{self, TABLE};
-use crate::gpu::{DeviceChoice, Gpu, Part, arrays};
+use crate::gpu::{DeviceChoice, Gpu, Part, arrays, function, table};
 use crate::integral::{Exact, Lookup};
-use crate::order::depth::{self, HIDDEN, IN_PARTS};
 use crate::view::{Blend, View};
 use bytemuck::{Pod, Zeroable};
+use drawing::Canvas;
+use ordering::Ordered;
+use program::{Program, program};
 use std::sync::Arc;
 use std::time::Instant;
-use wgpu::{BufferUsages as Usage, ShaderStages as Stages, TextureUsages};
-
-const SHARED: &str = include_str!("../../shaders/project.wgsl");
-const CELLS: &str = include_str!("../../shaders/project_cells.wgsl");
-const SHADE: &str = include_str!("../../shaders/project_shade.wgsl");
-
-/// For each form: its records, and how they are drawn.
-const INTERSECTED: [&str; 2] = [
-    include_str!("../../shaders/project_intersected.wgsl"),
-    include_str!("../../shaders/project_intersected_draw.wgsl"),
-];
-const INTERPOLATED: [&str; 2] = [
-    include_str!("../../shaders/project_interpolated.wgsl"),
-    include_str!("../../shaders/project_interpolated_draw.wgsl"),
-];
+use wgpu::{BufferUsages as Usage, ShaderStages as Stages};
 
 /// Records of one batch.
 const BATCH: usize = 1 << 17;
 
-/// Batches that are handed over at once: a driver ends work that takes seconds.
-const AT_ONCE: usize = 8;
-
-/// Entries of one buffer of the order, a multiple of [`BATCH`]; and those before each that it repeats.
-const ORDER_CHUNK: usize = BATCH << 6;
+/// Entries before each buffer of the order that it repeats.
 const REPEATED: usize = 2;
-
-/// Cells that are classified at once.
-const CLASSIFIED: usize = 1 << 24;
 
 /// Invocations of a compute group, and groups along one axis at most.
 const GROUP: u32 = 64;
 const MOST_GROUPS: u32 = 65_535;
-
-/// How much an outline is grown, in pixels: rasterisers round corners to this.
-const GROWTH: f64 = 1.0 / 256.0;
-
-/// Loop iterations of a fragment that llvmpipe surely makes: see `traverse::gpu`.
-const MOST_WORK: u32 = 8000;
 
 /// `Part` in the shaders.
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
@@ -70,44 +46,6 @@ struct Slice {
     count: u32,
     row: u32,
     rank: u32,
-}
-
-/// Somebody who is shown keys, some at a time.
-type Reader<'a> = &'a mut dyn FnMut(&[u32]);
-
-/// What the programs are compiled for.
-struct Program {
-    source: String,
-    format: wgpu::TextureFormat,
-    compositing: Compositing,
-    layout: Layout,
-    arrays: wgpu::BindGroupLayout,
-    classify: wgpu::ComputePipeline,
-    project: wgpu::ComputePipeline,
-    draw: wgpu::RenderPipeline,
-}
-
-/// What a frame's batches are drawn with and into.
-struct Canvas {
-    layout: Layout,
-    size: [u32; 2],
-    format: wgpu::TextureFormat,
-    records: Buffer,
-    indices: Buffer,
-    picture: Texture,
-    back: Readback,
-}
-
-/// The order of a frame, and what it holds for.
-struct Ordered {
-    frame: Frame,
-    planes: Vec<[f32; 4]>,
-    by: Order,
-    form: Fragments,
-    /// Entries, and the buffers that they are in, so many in each.
-    entries: usize,
-    chunk: usize,
-    chunks: Vec<Buffer>,
 }
 
 /// The transfer function on the device.
@@ -308,168 +246,6 @@ impl Project {
         }
     }
 
-    fn compile(
-        &mut self,
-        arrays: &[Array],
-        source: String,
-        switches: &Switches,
-        layout: Layout,
-        format: wgpu::TextureFormat,
-    ) -> Result<()> {
-        let compositing = switches.compositing;
-        let same = |p: &Program| p.source == source && p.format == format && p.compositing == compositing;
-        if self.program.as_ref().is_some_and(same) {
-            return Ok(());
-        }
-        let gpu = &self.gpu;
-        let bindings = arrays.iter().map(|a| a.chunks).sum();
-        let array_layout = raster::layout(gpu, Stages::COMPUTE, &vec![Slot::Read; bindings]);
-        let module = raster::module(gpu, "project", &source);
-        let cells = raster::pipeline_layout(gpu, &[Some(&self.shared), Some(&array_layout), Some(&self.own)]);
-        let drawing = raster::pipeline_layout(gpu, &[Some(&self.shared)]);
-        let blend = wgpu::BlendComponent {
-            src_factor: wgpu::BlendFactor::One,
-            dst_factor: match compositing {
-                Compositing::Over => wgpu::BlendFactor::OneMinusSrcAlpha,
-                Compositing::Additive => wgpu::BlendFactor::One,
-            },
-            operation: wgpu::BlendOperation::Add,
-        };
-        // The outline of an intersected cell may be no more than that: grown, it need not turn one way.
-        let culled = (switches.fragments != Fragments::Intersected).then_some(wgpu::Face::Back);
-        let program = Program {
-            classify: raster::compute(gpu, &module, "classify", &cells),
-            project: raster::compute(gpu, &module, "project_all", &cells),
-            draw: raster::render(
-                gpu,
-                &module,
-                &drawing,
-                (layout.part_bytes(), &layout.attributes()),
-                format,
-                blend,
-                culled,
-            ),
-            layout,
-            arrays: array_layout,
-            source,
-            format,
-            compositing,
-        };
-        gpu.check()?;
-        self.program = Some(program);
-        Ok(())
-    }
-
-    fn prepare_canvas(&mut self, layout: &Layout, size: [u32; 2], format: wgpu::TextureFormat) -> Result<()> {
-        if self.canvas.as_ref().is_some_and(|c| (&c.layout, c.size, c.format) == (layout, size, format)) {
-            return Ok(());
-        }
-        self.canvas = None;
-        let gpu = &self.gpu;
-        let Layout { triangles, parts, .. } = *layout;
-        let all: Vec<u32> = (0..BATCH as u32).flat_map(|r| triangles.iter().map(move |c| r * parts + c)).collect();
-        let [w, h] = size;
-        let canvas = Canvas {
-            // One more, as the last one's vertices look for words beyond it.
-            records: Buffer::new(gpu, "records", layout.bytes() * (BATCH as u64 + 1), Usage::STORAGE | Usage::VERTEX)?,
-            indices: Buffer::holding(gpu, "indices", &all, Usage::INDEX)?,
-            picture: Texture::new(
-                gpu,
-                "picture",
-                wgpu::TextureDimension::D2,
-                [w, h, 1],
-                format,
-                TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC,
-            )?,
-            back: Readback::new(gpu, u64::from(row_bytes(w, format)) * u64::from(h) + 16 * u64::from(CLOCKS))?,
-            layout: layout.clone(),
-            size,
-            format,
-        };
-        self.canvas = Some(canvas);
-        Ok(())
-    }
-
-    /// Finds the cells that are seen, and sorts them.
-    fn order(&mut self, frame: &Pass, seen: &Seen, cells: usize, switches: &Switches) -> Result<Ordered> {
-        let ordered = |entries, chunk, chunks| Ordered {
-            frame: seen.frame,
-            planes: seen.planes.clone(),
-            by: switches.order,
-            form: switches.fragments,
-            entries,
-            chunk,
-            chunks,
-        };
-        // Cells in parts are sorted on the host, which can make several entries of one.
-        let whole = switches.fragments == Fragments::Intersected && switches.order != Order::None;
-        if self.sorts && whole && Sorter::fits(&self.gpu, cells, REPEATED) {
-            if self.sorter.is_none() {
-                self.sorter = Some(Sorter::new(&self.gpu, HIDDEN)?);
-            }
-            let keys = self.classify(frame, cells, None)?;
-            let sorter = self.sorter.as_ref().ok_or_else(unprepared)?;
-            let (order, entries) = sorter.sort(&self.gpu, &keys, cells, REPEATED)?;
-            return Ok(ordered(entries, usize::MAX, vec![order]));
-        }
-        let mut all: Vec<u32> = Vec::with_capacity(cells);
-        self.classify(frame, cells, Some(&mut |keys: &[u32]| all.extend_from_slice(keys)))?;
-        let order = depth::order(&all, switches.order != Order::None).cells;
-        drop(all);
-        let chunks = (0..order.len())
-            .step_by(ORDER_CHUNK)
-            .map(|first| {
-                let end = (first + ORDER_CHUNK).min(order.len());
-                if first == 0 {
-                    let own = [&[HIDDEN; REPEATED][..], &order[..end]].concat();
-                    return Buffer::holding(&self.gpu, "order", &own, Usage::STORAGE);
-                }
-                Buffer::holding(&self.gpu, "order", &order[first - REPEATED..end], Usage::STORAGE)
-            })
-            .collect::<Result<_>>()?;
-        Ok(ordered(order.len(), ORDER_CHUNK, chunks))
-    }
-
-    /// The keys of all cells. If somebody wants to read them, they are shown some at a time, and only the last are returned.
-    fn classify(&self, frame: &Pass, cells: usize, mut read: Option<Reader>) -> Result<Buffer> {
-        let gpu = &self.gpu;
-        let program = self.program.as_ref().ok_or_else(unprepared)?;
-        let at_once = if read.is_some() { CLASSIFIED } else { cells };
-        let size = 4 * cells.min(at_once) as u64;
-        let keys = Buffer::new(gpu, "keys", size, Usage::STORAGE | Usage::COPY_SRC)?;
-        let back = Readback::new(gpu, if read.is_some() { size } else { 4 })?;
-        let slice = Buffer::new(gpu, "slice", size_of::<Slice>() as u64, Usage::UNIFORM | Usage::COPY_DST)?;
-        let none = [Buffer::new(gpu, "none", 16, Usage::STORAGE)?, Buffer::new(gpu, "none", 512, Usage::STORAGE)?];
-        let records = none[1].raw.as_entire_binding();
-        let own = self.own_group(frame, slice.raw.as_entire_binding(), &keys, &none[0], records);
-        for first in (0..cells).step_by(at_once.max(1)) {
-            let count = (cells - first).min(at_once);
-            let (row, groups) = groups_of(count);
-            let part = Slice { first: first as u32, count: count as u32, row, rank: 0 };
-            slice.write(gpu, 0, bytemuck::bytes_of(&part));
-            let mut encoder = gpu.device.create_command_encoder(&Default::default());
-            {
-                let mut pass = encoder.begin_compute_pass(&Default::default());
-                pass.set_pipeline(&program.classify);
-                pass.set_bind_group(0, &frame.shared, &[]);
-                pass.set_bind_group(1, &frame.arrays, &[]);
-                pass.set_bind_group(2, &own, &[]);
-                pass.dispatch_workgroups(groups[0], groups[1], 1);
-            }
-            match &mut read {
-                Some(read) => {
-                    encoder.copy_buffer_to_buffer(&keys.raw, 0, back.raw(), 0, 4 * count as u64);
-                    back.submit(gpu, encoder, |bytes| read(bytemuck::cast_slice(&bytes[..4 * count])))?;
-                }
-                None => {
-                    gpu.queue.submit([encoder.finish()]);
-                    gpu.check()?;
-                }
-            }
-        }
-        Ok(keys)
-    }
-
     fn own_group(
         &self,
         frame: &Pass,
@@ -479,141 +255,7 @@ impl Project {
         records: wgpu::BindingResource,
     ) -> wgpu::BindGroup {
         let [keys, order] = [keys, order].map(|b| b.raw.as_entire_binding());
-        raster::group(&self.gpu, &self.own, [slice, frame.filled.clone(), keys, order, records])
-    }
-
-    /// Projects and draws all batches.
-    fn draw(&self, frame: &Pass, view: &View, counts: &mut Counts) -> Result<Vec<[f32; 4]>> {
-        let gpu = &self.gpu;
-        let (Some(program), Some(canvas), Some(ordered)) = (&self.program, &self.canvas, &self.ordered) else {
-            return Err(unprepared());
-        };
-        let format = canvas.format;
-        counts.records = ordered.entries as u64;
-        // Each batch's slice at its own offset, as uniforms are aligned.
-        let step = gpu.device.limits().min_uniform_buffer_offset_alignment.max(size_of::<Slice>() as u32) as usize;
-        let firsts: Vec<usize> = (0..ordered.entries).step_by(BATCH).collect();
-        let mut slices = vec![0u8; step * firsts.len().max(1)];
-        for (i, &first) in firsts.iter().enumerate() {
-            let count = (ordered.entries - first).min(BATCH);
-            let within = first % ordered.chunk + REPEATED;
-            let slice =
-                Slice { first: within as u32, count: count as u32, row: groups_of(count).0, rank: first as u32 };
-            slices[step * i..][..size_of::<Slice>()].copy_from_slice(bytemuck::bytes_of(&slice));
-        }
-        let slices = Buffer::holding(gpu, "slices", &slices, Usage::UNIFORM)?;
-        let none = Buffer::new(gpu, "none", 16, Usage::STORAGE)?;
-        let clock = Clock::new(gpu)?;
-
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        self.clear(&mut encoder, canvas);
-        // Devices in software tell no times of their parts: the host waits for each, which costs them nothing.
-        let is_software = gpu.adapter.kind == "CPU";
-        let (mut project_ms, mut since) = (0.0, Instant::now());
-        let begun = since;
-        for (i, &first) in firsts.iter().enumerate() {
-            let count = (ordered.entries - first).min(BATCH);
-            let slice = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
-                buffer: &slices.raw,
-                offset: (step * i) as u64,
-                size: std::num::NonZeroU64::new(size_of::<Slice>() as u64),
-            });
-            let order = &ordered.chunks[first / ordered.chunk];
-            let own = self.own_group(frame, slice, &none, order, canvas.records.raw.as_entire_binding());
-            {
-                let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-                    label: Some("project"),
-                    timestamp_writes: clock.as_ref().and_then(|c| c.compute(i)),
-                });
-                let groups = groups_of(count).1;
-                pass.set_pipeline(&program.project);
-                pass.set_bind_group(0, &frame.shared, &[]);
-                pass.set_bind_group(1, &frame.arrays, &[]);
-                pass.set_bind_group(2, &own, &[]);
-                pass.dispatch_workgroups(groups[0], groups[1], 1);
-            }
-            if is_software {
-                gpu.queue.submit([encoder.finish()]);
-                gpu.wait()?;
-                project_ms += since.elapsed().as_secs_f64() * 1e3;
-                encoder = gpu.device.create_command_encoder(&Default::default());
-            }
-            {
-                let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                    label: Some("draw"),
-                    color_attachments: &[Some(attachment(&canvas.picture, wgpu::LoadOp::Load))],
-                    timestamp_writes: clock.as_ref().and_then(|c| c.render(i)),
-                    ..Default::default()
-                });
-                pass.set_pipeline(&program.draw);
-                pass.set_bind_group(0, &frame.shared, &[]);
-                for part in 0..program.layout.parts {
-                    let from = u64::from(part) * program.layout.part_bytes();
-                    pass.set_vertex_buffer(part, canvas.records.raw.slice(from..));
-                }
-                pass.set_index_buffer(canvas.indices.raw.slice(..), wgpu::IndexFormat::Uint32);
-                let counter = clock.as_ref().and_then(|c| c.fragments.as_ref()).filter(|_| i < CLOCKS as usize / 4);
-                if let Some(counter) = counter {
-                    pass.begin_pipeline_statistics_query(counter, i as u32);
-                }
-                pass.draw_indexed(0..(count * program.layout.triangles.len()) as u32, 0, 0..1);
-                if counter.is_some() {
-                    pass.end_pipeline_statistics_query();
-                }
-            }
-            if is_software || (i + 1) % AT_ONCE == 0 {
-                gpu.queue.submit([encoder.finish()]);
-                encoder = gpu.device.create_command_encoder(&Default::default());
-            }
-            if is_software {
-                gpu.wait()?;
-                since = Instant::now();
-            }
-        }
-        if is_software {
-            let all = begun.elapsed().as_secs_f64() * 1e3;
-            (counts.project_ms, counts.draw_ms) = (Some(project_ms), Some(all - project_ms));
-        }
-        let [w, h] = view.size();
-        let row = row_bytes(w, format);
-        let picture_bytes = u64::from(row) * u64::from(h);
-        encoder.copy_texture_to_buffer(
-            canvas.picture.raw.as_image_copy(),
-            wgpu::TexelCopyBufferInfo {
-                buffer: canvas.back.raw(),
-                layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row), rows_per_image: None },
-            },
-            wgpu::Extent3d { width: w, height: h, depth_or_array_layers: 1 },
-        );
-        let measured = firsts.len().min(CLOCKS as usize / 4);
-        if let Some(clock) = clock.as_ref().filter(|_| measured > 0) {
-            clock.resolve(&mut encoder, canvas.back.raw(), picture_bytes, measured);
-        }
-        canvas.back.submit(gpu, encoder, |bytes| {
-            let (picture, times) = bytes.split_at(picture_bytes as usize);
-            if clock.is_some() && measured == firsts.len() {
-                let (times, fragments): (&[u64], &[u64]) = bytemuck::cast_slice(times).split_at(CLOCKS as usize);
-                let times = &times[..4 * measured];
-                let counted = clock.as_ref().is_some_and(|c| c.fragments.is_some());
-                counts.fragments = counted.then(|| fragments[..measured].iter().sum());
-                let period = f64::from(gpu.queue.get_timestamp_period()) / 1e6;
-                let sum =
-                    |at: usize| times.chunks(4).map(|t| t[at + 1].saturating_sub(t[at])).sum::<u64>() as f64 * period;
-                if !is_software {
-                    (counts.project_ms, counts.draw_ms) = (Some(sum(0)), Some(sum(2)));
-                }
-            }
-            picture.chunks(row as usize).flat_map(|line| pixels(&line[..w as usize * texel(format)], format)).collect()
-        })
-    }
-
-    fn clear(&self, encoder: &mut wgpu::CommandEncoder, canvas: &Canvas) {
-        let clear = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
-        encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("clear"),
-            color_attachments: &[Some(attachment(&canvas.picture, clear))],
-            ..Default::default()
-        });
+        raster::group(&self.gpu, &self.own, [slice, frame.filled.as_entire_binding(), keys, order, records])
     }
 }
 
@@ -621,17 +263,8 @@ impl Project {
 struct Pass {
     shared: wgpu::BindGroup,
     arrays: wgpu::BindGroup,
-    filled: FilledBinding,
+    filled: wgpu::Buffer,
     _buffers: [Buffer; 3],
-}
-
-/// A binding of a buffer that lives as long as a frame.
-struct FilledBinding(wgpu::Buffer);
-
-impl FilledBinding {
-    fn clone(&self) -> wgpu::BindingResource<'_> {
-        self.0.as_entire_binding()
-    }
 }
 
 impl Pass {
@@ -653,33 +286,14 @@ impl Pass {
         Ok(Pass {
             shared: raster::group(gpu, &project.shared, shared),
             arrays: raster::group(gpu, &program.arrays, arrays),
-            filled: FilledBinding(filled.raw.clone()),
+            filled: filled.raw.clone(),
             _buffers: buffers,
         })
     }
 }
 
-impl Ordered {
-    fn holds_for(&self, seen: &Seen, switches: &Switches) -> bool {
-        let parts = |form| form != Fragments::Intersected;
-        self.frame == seen.frame
-            && self.planes == seen.planes
-            && self.by == switches.order
-            && parts(self.form) == parts(switches.fragments)
-    }
-}
-
 fn unprepared() -> Error {
     Error::Render("the device is not prepared for a frame".into())
-}
-
-fn attachment(texture: &Texture, load: wgpu::LoadOp<wgpu::Color>) -> wgpu::RenderPassColorAttachment<'_> {
-    wgpu::RenderPassColorAttachment {
-        view: &texture.view,
-        depth_slice: None,
-        resolve_target: None,
-        ops: wgpu::Operations { load, store: wgpu::StoreOp::Store },
-    }
 }
 
 /// Invocations of a row, and groups of a dispatch that is as many rows as `count` invocations need.
@@ -689,72 +303,5 @@ fn groups_of(count: usize) -> (u32, [u32; 2]) {
     (across * GROUP, [across, groups.div_ceil(across)])
 }
 
-fn texel(format: wgpu::TextureFormat) -> usize {
-    match format {
-        wgpu::TextureFormat::Rgba32Float => 16,
-        wgpu::TextureFormat::Rgba16Float => 8,
-        _ => 4,
-    }
-}
-
-/// Bytes of a row of pixels, as copies want it.
-fn row_bytes(width: u32, format: wgpu::TextureFormat) -> u32 {
-    (width * texel(format) as u32).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT)
-}
-
-/// The pixels of a row.
-fn pixels(bytes: &[u8], format: wgpu::TextureFormat) -> Vec<[f32; 4]> {
-    match format {
-        wgpu::TextureFormat::Rgba32Float => bytemuck::cast_slice(bytes).to_vec(),
-        wgpu::TextureFormat::Rgba16Float => {
-            let half = |b: &[u8]| half::f16::from_le_bytes([b[0], b[1]]).to_f32();
-            bytes.chunks_exact(8).map(|p| [0, 2, 4, 6].map(|k| half(&p[k..]))).collect()
-        }
-        _ => bytes.chunks_exact(4).map(|p| [0, 1, 2, 3].map(|k| f32::from(p[k]) / 255.0)).collect(),
-    }
-}
-
-/// The whole program.
-fn program(
-    variant: &Variant,
-    association: &str,
-    switches: &Switches,
-    layout: &Layout,
-    table: Option<&Lookup>,
-    limits: Limits,
-    arrays: &[Array],
-) -> String {
-    let mut text = shader::prelude(variant);
-    for (name, value) in [("FAR", f64::from(FAR)), ("GROWTH", GROWTH), ("BESIDE", 1e-6)] {
-        text += &format!("const {name} = {value:?}f;\n");
-    }
-    let form = match switches.fragments {
-        Fragments::Intersected => "INTERSECTED",
-        Fragments::Interpolated => "INTERPOLATED",
-        Fragments::Linear => "LINEAR",
-    };
-    for (name, value) in [
-        ("BY_DEPTH", switches.thickness == Thickness::Depth),
-        ("DITHERED", switches.dither && switches.target == Target::Rgba8),
-        ("ADDITIVE", switches.compositing == Compositing::Additive),
-        ("HAS_ENDS", limits.ends),
-        ("HAS_PLANES", limits.planes),
-        ("BY_SPHERE", switches.order == Order::Circumsphere),
-    ] {
-        text += &format!("const {name} = {value};\n");
-    }
-    text += &format!(
-        "const LINES_ACROSS = {LINES_ACROSS}u;\nconst HIDDEN = {HIDDEN}u;\nconst IN_PARTS = {IN_PARTS}u;\nconst FILLED = {FILLED}u;\nconst MOST_WORK = {MOST_WORK}u;\n\
-         const INTERSECTED = 0u;\nconst INTERPOLATED = 1u;\nconst LINEAR = 2u;\nconst FORM = {form};\n\
-         const POINT = 0u;\nconst CORNER = 1u;\nconst CELL = 2u;\nconst ASSOCIATION = {association};\n"
-    );
-    text += arrays::POINT;
-    let [records, drawing] = if form == "INTERSECTED" { INTERSECTED } else { INTERPOLATED };
-    text += &layout.wgsl();
-    text += &shader::accessors(arrays);
-    text += &table::constants(table, limits.plane_per_cell);
-    text += &table::declarations(0, 6);
-    [&text, shader::CELL, shader::INTEGRAL, TABLE, SHARED, CELLS, records, SHADE, drawing].join("\n")
-}
 #[cfg(test)]
 mod tests;

@@ -1,10 +1,15 @@
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr, reason = "tests")]
 
+use super::ordering::ORDER_CHUNK;
 use super::*;
 use crate::field::{Association, Component, Field, Kind};
+use crate::gpu::raster::Readback;
 use crate::gpu::testing::{gpu, validated};
 use crate::integral::lookup::tests::{choices, exact};
 use crate::mesh::{cells::Tetrahedra, generate};
+use crate::order::depth::{self, HIDDEN, IN_PARTS};
+use crate::project::Compositing;
+use crate::project::frame::{Frame, Limits};
 use crate::render::{Engine, Renderer};
 use crate::transfer::{Emission, TransferFunction};
 use crate::view::{Camera, Projection};

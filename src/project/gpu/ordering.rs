@@ -1,0 +1,124 @@
+//! Which cells are seen, and in which order they are drawn.
+
+use super::{BATCH, Pass, Project, REPEATED, Slice, groups_of, unprepared};
+use crate::error::Result;
+use crate::gpu::buffers::Buffer;
+use crate::gpu::raster::Readback;
+use crate::gpu::sort::Sorter;
+use crate::order::depth::{self, HIDDEN};
+use crate::project::frame::{Frame, Seen};
+use crate::project::{Fragments, Order, Switches};
+use wgpu::BufferUsages as Usage;
+
+/// Entries of one buffer of the order, a multiple of [`BATCH`].
+pub(super) const ORDER_CHUNK: usize = BATCH << 6;
+
+/// Cells that are classified at once.
+const CLASSIFIED: usize = 1 << 24;
+
+/// Somebody who is shown keys, some at a time.
+type Reader<'a> = &'a mut dyn FnMut(&[u32]);
+
+/// The order of a frame, and what it holds for.
+pub(super) struct Ordered {
+    frame: Frame,
+    planes: Vec<[f32; 4]>,
+    by: Order,
+    form: Fragments,
+    /// Entries, and the buffers that they are in, so many in each.
+    pub(super) entries: usize,
+    pub(super) chunk: usize,
+    pub(super) chunks: Vec<Buffer>,
+}
+
+impl Ordered {
+    pub(super) fn holds_for(&self, seen: &Seen, switches: &Switches) -> bool {
+        let parts = |form| form != Fragments::Intersected;
+        self.frame == seen.frame
+            && self.planes == seen.planes
+            && self.by == switches.order
+            && parts(self.form) == parts(switches.fragments)
+    }
+}
+
+impl Project {
+    /// Finds the cells that are seen, and sorts them.
+    pub(super) fn order(&mut self, frame: &Pass, seen: &Seen, cells: usize, switches: &Switches) -> Result<Ordered> {
+        let ordered = |entries, chunk, chunks| Ordered {
+            frame: seen.frame,
+            planes: seen.planes.clone(),
+            by: switches.order,
+            form: switches.fragments,
+            entries,
+            chunk,
+            chunks,
+        };
+        // Cells in parts are sorted on the host, which can make several entries of one.
+        let whole = switches.fragments == Fragments::Intersected && switches.order != Order::None;
+        if self.sorts && whole && Sorter::fits(&self.gpu, cells, REPEATED) {
+            if self.sorter.is_none() {
+                self.sorter = Some(Sorter::new(&self.gpu, HIDDEN)?);
+            }
+            let keys = self.classify(frame, cells, None)?;
+            let sorter = self.sorter.as_ref().ok_or_else(unprepared)?;
+            let (order, entries) = sorter.sort(&self.gpu, &keys, cells, REPEATED)?;
+            return Ok(ordered(entries, usize::MAX, vec![order]));
+        }
+        let mut all: Vec<u32> = Vec::with_capacity(cells);
+        self.classify(frame, cells, Some(&mut |keys: &[u32]| all.extend_from_slice(keys)))?;
+        let order = depth::order(&all, switches.order != Order::None).cells;
+        drop(all);
+        let chunks = (0..order.len())
+            .step_by(ORDER_CHUNK)
+            .map(|first| {
+                let end = (first + ORDER_CHUNK).min(order.len());
+                if first == 0 {
+                    let own = [&[HIDDEN; REPEATED][..], &order[..end]].concat();
+                    return Buffer::holding(&self.gpu, "order", &own, Usage::STORAGE);
+                }
+                Buffer::holding(&self.gpu, "order", &order[first - REPEATED..end], Usage::STORAGE)
+            })
+            .collect::<Result<_>>()?;
+        Ok(ordered(order.len(), ORDER_CHUNK, chunks))
+    }
+
+    /// The keys of all cells. If somebody wants to read them, they are shown some at a time, and only the last are returned.
+    fn classify(&self, frame: &Pass, cells: usize, mut read: Option<Reader>) -> Result<Buffer> {
+        let gpu = &self.gpu;
+        let program = self.program.as_ref().ok_or_else(unprepared)?;
+        let at_once = if read.is_some() { CLASSIFIED } else { cells };
+        let size = 4 * cells.min(at_once) as u64;
+        let keys = Buffer::new(gpu, "keys", size, Usage::STORAGE | Usage::COPY_SRC)?;
+        let back = Readback::new(gpu, if read.is_some() { size } else { 4 })?;
+        let slice = Buffer::new(gpu, "slice", size_of::<Slice>() as u64, Usage::UNIFORM | Usage::COPY_DST)?;
+        let none = [Buffer::new(gpu, "none", 16, Usage::STORAGE)?, Buffer::new(gpu, "none", 512, Usage::STORAGE)?];
+        let records = none[1].raw.as_entire_binding();
+        let own = self.own_group(frame, slice.raw.as_entire_binding(), &keys, &none[0], records);
+        for first in (0..cells).step_by(at_once.max(1)) {
+            let count = (cells - first).min(at_once);
+            let (row, groups) = groups_of(count);
+            let part = Slice { first: first as u32, count: count as u32, row, rank: 0 };
+            slice.write(gpu, 0, bytemuck::bytes_of(&part));
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            {
+                let mut pass = encoder.begin_compute_pass(&Default::default());
+                pass.set_pipeline(&program.classify);
+                pass.set_bind_group(0, &frame.shared, &[]);
+                pass.set_bind_group(1, &frame.arrays, &[]);
+                pass.set_bind_group(2, &own, &[]);
+                pass.dispatch_workgroups(groups[0], groups[1], 1);
+            }
+            match &mut read {
+                Some(read) => {
+                    encoder.copy_buffer_to_buffer(&keys.raw, 0, back.raw(), 0, 4 * count as u64);
+                    back.submit(gpu, encoder, |bytes| read(bytemuck::cast_slice(&bytes[..4 * count])))?;
+                }
+                None => {
+                    gpu.queue.submit([encoder.finish()]);
+                    gpu.check()?;
+                }
+            }
+        }
+        Ok(keys)
+    }
+}

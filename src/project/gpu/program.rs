@@ -1,0 +1,145 @@
+//! What the programs are compiled from, and for.
+
+use super::Project;
+use crate::error::Result;
+use crate::gpu::arrays;
+use crate::gpu::function::LINES_ACROSS;
+use crate::gpu::raster::{self, Slot};
+use crate::gpu::shader::{self, Array, Variant};
+use crate::gpu::table::{self, TABLE};
+use crate::integral::Lookup;
+use crate::order::depth::{HIDDEN, IN_PARTS};
+use crate::project::frame::{FAR, FILLED, Limits};
+use crate::project::record::Layout;
+use crate::project::{Compositing, Fragments, Order, Switches, Target, Thickness};
+use wgpu::ShaderStages as Stages;
+
+const SHARED: &str = include_str!("../../../shaders/project.wgsl");
+const CELLS: &str = include_str!("../../../shaders/project_cells.wgsl");
+const SHADE: &str = include_str!("../../../shaders/project_shade.wgsl");
+
+/// For each form: its records, and how they are drawn.
+const INTERSECTED: [&str; 2] = [
+    include_str!("../../../shaders/project_intersected.wgsl"),
+    include_str!("../../../shaders/project_intersected_draw.wgsl"),
+];
+
+const INTERPOLATED: [&str; 2] = [
+    include_str!("../../../shaders/project_interpolated.wgsl"),
+    include_str!("../../../shaders/project_interpolated_draw.wgsl"),
+];
+
+/// How much an outline is grown, in pixels: rasterisers round corners to this.
+const GROWTH: f64 = 1.0 / 256.0;
+
+/// Loop iterations of a fragment that llvmpipe surely makes: see `traverse::gpu`.
+const MOST_WORK: u32 = 8000;
+
+/// What the programs are compiled for.
+pub(super) struct Program {
+    source: String,
+    format: wgpu::TextureFormat,
+    compositing: Compositing,
+    pub(super) layout: Layout,
+    pub(super) arrays: wgpu::BindGroupLayout,
+    pub(super) classify: wgpu::ComputePipeline,
+    pub(super) project: wgpu::ComputePipeline,
+    pub(super) draw: wgpu::RenderPipeline,
+}
+
+impl Project {
+    pub(super) fn compile(
+        &mut self,
+        arrays: &[Array],
+        source: String,
+        switches: &Switches,
+        layout: Layout,
+        format: wgpu::TextureFormat,
+    ) -> Result<()> {
+        let compositing = switches.compositing;
+        let same = |p: &Program| p.source == source && p.format == format && p.compositing == compositing;
+        if self.program.as_ref().is_some_and(same) {
+            return Ok(());
+        }
+        let gpu = &self.gpu;
+        let bindings = arrays.iter().map(|a| a.chunks).sum();
+        let array_layout = raster::layout(gpu, Stages::COMPUTE, &vec![Slot::Read; bindings]);
+        let module = raster::module(gpu, "project", &source);
+        let cells = raster::pipeline_layout(gpu, &[Some(&self.shared), Some(&array_layout), Some(&self.own)]);
+        let drawing = raster::pipeline_layout(gpu, &[Some(&self.shared)]);
+        let blend = wgpu::BlendComponent {
+            src_factor: wgpu::BlendFactor::One,
+            dst_factor: match compositing {
+                Compositing::Over => wgpu::BlendFactor::OneMinusSrcAlpha,
+                Compositing::Additive => wgpu::BlendFactor::One,
+            },
+            operation: wgpu::BlendOperation::Add,
+        };
+        // The outline of an intersected cell may be no more than that: grown, it need not turn one way.
+        let culled = (switches.fragments != Fragments::Intersected).then_some(wgpu::Face::Back);
+        let program = Program {
+            classify: raster::compute(gpu, &module, "classify", &cells),
+            project: raster::compute(gpu, &module, "project_all", &cells),
+            draw: raster::render(
+                gpu,
+                &module,
+                &drawing,
+                (layout.part_bytes(), &layout.attributes()),
+                format,
+                blend,
+                culled,
+            ),
+            layout,
+            arrays: array_layout,
+            source,
+            format,
+            compositing,
+        };
+        gpu.check()?;
+        self.program = Some(program);
+        Ok(())
+    }
+}
+
+/// The whole program.
+pub(super) fn program(
+    variant: &Variant,
+    association: &str,
+    switches: &Switches,
+    layout: &Layout,
+    table: Option<&Lookup>,
+    limits: Limits,
+    arrays: &[Array],
+) -> String {
+    let mut text = shader::prelude(variant);
+    for (name, value) in [("FAR", f64::from(FAR)), ("GROWTH", GROWTH), ("BESIDE", 1e-6)] {
+        text += &format!("const {name} = {value:?}f;\n");
+    }
+    let form = match switches.fragments {
+        Fragments::Intersected => "INTERSECTED",
+        Fragments::Interpolated => "INTERPOLATED",
+        Fragments::Linear => "LINEAR",
+    };
+    for (name, value) in [
+        ("BY_DEPTH", switches.thickness == Thickness::Depth),
+        ("DITHERED", switches.dither && switches.target == Target::Rgba8),
+        ("ADDITIVE", switches.compositing == Compositing::Additive),
+        ("HAS_ENDS", limits.ends),
+        ("HAS_PLANES", limits.planes),
+        ("BY_SPHERE", switches.order == Order::Circumsphere),
+    ] {
+        text += &format!("const {name} = {value};\n");
+    }
+    text += &format!(
+        "const LINES_ACROSS = {LINES_ACROSS}u;\nconst HIDDEN = {HIDDEN}u;\nconst IN_PARTS = {IN_PARTS}u;\nconst FILLED = {FILLED}u;\nconst MOST_WORK = {MOST_WORK}u;\n\
+         const INTERSECTED = 0u;\nconst INTERPOLATED = 1u;\nconst LINEAR = 2u;\nconst FORM = {form};\n\
+         const POINT = 0u;\nconst CORNER = 1u;\nconst CELL = 2u;\nconst ASSOCIATION = {association};\n"
+    );
+    text += arrays::POINT;
+    let [records, drawing] = if form == "INTERSECTED" { INTERSECTED } else { INTERPOLATED };
+    text += &layout.wgsl();
+    text += &shader::accessors(arrays);
+    text += &table::constants(table, limits.plane_per_cell);
+    text += &table::declarations(0, 6);
+    [&text, shader::CELL, shader::INTEGRAL, TABLE, SHARED, CELLS, records, SHADE, drawing].join("\n")
+}
