@@ -292,7 +292,7 @@ mod tests {
     #[test]
     fn tables_are_those_of_the_cpu() {
         let Some(choice) = testing::choice() else { return };
-        for (name, transfer) in transfers() {
+        for (name, transfer) in transfers(77) {
             let device = Constructor::open(&choice, &transfer, &NORMAL, 1.0).unwrap().unwrap();
             let exact = &device.exact;
             let near = |got: &[[f32; 4]], want: &[[f32; 4]], most: f32, what: &str| {
