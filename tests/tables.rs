@@ -15,7 +15,7 @@ use glam::{DVec3, dvec3};
 use halite::field::Association;
 use halite::gpu::DeviceChoice;
 use halite::image::Image;
-use halite::integral::choice::{Alpha, Choice, Form, Planes, Texels};
+use halite::integral::choice::{Alpha, Build, Choice, Form, Planes, Texels};
 use halite::integral::table::Kind;
 use halite::mesh::cells::Tetrahedra;
 use halite::mesh::generate;
@@ -147,6 +147,37 @@ fn both_engines_draw_with_each_form() {
         }
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+/// Tables that the device builds draw what those do that it is handed; and after an edit the exact frame comes first, as ever.
+#[test]
+fn devices_build_what_they_draw_with() {
+    let (scene, other) = (waves(Emission::Chromatic), waves(Emission::Direct { scale: 0.4 }));
+    let view = view(PERSPECTIVE);
+    for (engine, renderer) in &mut renderers() {
+        for choice in [volume(Kind::LogNormalised, [128, 128, 12]), polynomial(2), cylindrical(Planes::Two)] {
+            let [handed, built] = [Build::Host, Build::Device].map(|build| {
+                set(renderer, &scene);
+                let choice = Choice { build, ..choice };
+                let first = image(renderer, choice, &view);
+                let uploaded = renderer.stats().uploaded_bytes;
+                assert!(renderer.stats().table_ms > 0.0, "{engine}, {build:?}");
+                renderer.set_transfer(&other.transfer);
+                renderer.render(&view, &|_| ()).unwrap();
+                assert_eq!(renderer.stats().integral, "exact", "{engine}, {build:?}");
+                renderer.wait_for_table();
+                (first, image(renderer, choice, &view), uploaded)
+            });
+            let apart = [(&handed.0, &built.0), (&handed.1, &built.1)].map(|(a, b)| a.compare(b).unwrap().max);
+            eprintln!("{engine}, {}: {apart:?}, {} and {} bytes", choice.form.name(), handed.2, built.2);
+            // Filters of real devices mix the same texels alike.
+            assert!(apart.iter().all(|&a| a < 2e-4), "{engine}, {choice:?}: {apart:?}");
+            assert!(*engine == "cpu" || built.2 + 100_000 < handed.2, "{engine}: {} {}", built.2, handed.2);
+        }
+        // What a device cannot build, the host does.
+        let degree = Choice { build: Build::Device, ..polynomial(6) };
+        assert!(image(renderer, degree, &view).pixels.iter().any(|p| p[3] > 0.5), "{engine}");
+    }
 }
 
 #[test]

@@ -203,7 +203,7 @@ impl Project {
     }
 
     /// Hands over what the device does not hold yet.
-    fn upload<const N: usize>(&mut self, geometry: &Geometry, values: &Values<N>, exact: &Exact<f32>) -> Result<()> {
+    fn upload<const N: usize>(&mut self, geometry: &Geometry, values: &Values<N>) -> Result<()> {
         let gpu = &self.gpu;
         if self.cells.is_none() {
             self.cells = Some(Chunks::new(gpu, "cells", &geometry.cells, |c| c.corners)?);
@@ -214,11 +214,23 @@ impl Project {
         if self.values.is_none() {
             self.values = Some(arrays::values(gpu, values)?);
         }
-        if self.function.is_none() {
-            let filled = Buffer::holding(gpu, "filled", &filled(exact), Usage::STORAGE)?;
-            self.function = Some((function::upload(gpu, exact)?, filled));
-        }
         Ok(())
+    }
+
+    /// Has the device hold the function and `table`, or build that, unless it does.
+    ///
+    /// # Errors
+    /// Those of [`table::Held::prepare`].
+    pub(crate) fn prepare_table(&mut self, exact: &Exact<f32>, table: Option<&Arc<Lookup>>) -> Result<()> {
+        let gpu = &self.gpu;
+        let function = match self.function.take() {
+            Some(function) => function,
+            None => {
+                let filled = Buffer::holding(gpu, "filled", &filled(exact), Usage::STORAGE)?;
+                (function::upload(gpu, exact)?, filled)
+            }
+        };
+        self.table.prepare(gpu, table, &self.function.insert(function).0)
     }
 
     /// Draws a frame; premultiplied colours, row by row.
@@ -240,8 +252,8 @@ impl Project {
             return Err(Error::View(what.into()));
         }
         let format = self.format(switches.target)?;
-        self.upload(geometry, values, exact)?;
-        self.table.prepare(&self.gpu, table)?;
+        self.upload(geometry, values)?;
+        self.prepare_table(exact, table)?;
         let association = arrays::association(values);
         let arrays = self.arrays()?;
         let seen = Seen::new(geometry, view);

@@ -1,7 +1,8 @@
 //! Tables, built while frames are drawn.
 //!
 //! A frame that cannot wait is drawn with the exact integral until its table is there: it is never of another function than it
-//! should be.
+//! should be. Tables that the device builds are there as soon as they were asked for, as it does one thing after another; that is asked
+//! for after the frame that did not wait.
 
 use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Values};
@@ -19,6 +20,8 @@ pub(super) struct Key {
     pub(super) exact: Exact<f64>,
     pub(super) choice: Choice,
     pub(super) longest: f64,
+    /// The device that draws builds it.
+    pub(super) on_device: bool,
 }
 
 /// A table, and the ms that building it took.
@@ -40,7 +43,8 @@ pub(super) struct Tables {
 impl Key {
     fn build(&self) -> Result<Built> {
         let start = Instant::now();
-        let table = Lookup::new(&self.exact, &self.choice, self.longest)?;
+        let make = if self.on_device { Lookup::outline } else { Lookup::new };
+        let table = make(&self.exact, &self.choice, self.longest)?;
         Ok(Built { table: Arc::new(table), ms: start.elapsed().as_secs_f64() * 1e3 })
     }
 }
@@ -77,6 +81,10 @@ impl Tables {
         if self.building.is_some() || self.ready.as_ref().is_some_and(|r| r.0 == *key) {
             return Ok(());
         }
+        if key.on_device {
+            self.ready = Some((Arc::clone(key), key.build()?));
+            return Ok(());
+        }
         let (sender, receiver) = channel();
         let own_key = Arc::clone(key);
         self.pool(own)?.spawn(move || {
@@ -85,6 +93,18 @@ impl Tables {
         });
         self.building = Some((Arc::clone(key), receiver));
         Ok(())
+    }
+
+    /// The table of `key`, if it is there.
+    pub(super) fn ready(&self, key: &Arc<Key>) -> Option<&Built> {
+        self.ready.as_ref().filter(|r| r.0 == *key).map(|r| &r.1)
+    }
+
+    /// Notes what building the table of `key` took.
+    pub(super) fn took(&mut self, key: &Arc<Key>, ms: f64) {
+        if let Some((_, built)) = self.ready.as_mut().filter(|r| r.0 == *key) {
+            built.ms += ms;
+        }
     }
 
     /// Takes what has been built, waiting for it if it is `key`'s.

@@ -24,9 +24,14 @@
 //! not count. So E[ρ̂] is off by at most (ε_f + ε_b + r/√8)/d, d the least distance of the values in texels and r what ρ̂ varies over the
 //! cell: the last is the covariance of ρ̂ and d. From an error δ of ρ̂ ≥ ρ₀, opacity is off by at most e^{−lρ₀} − e^{−l(ρ₀+δ)}.
 //!
+//! Where one kink, of a change of slope σ per texel, is between two neighbouring intervals, E[ρ̂] is off by σ/16 at most.
+//!
 //! Ĉ is a mean of κ, and so off by no more than κ varies over the cell. Its weights p = lρ e^{−D}/α are off by ∫|p − p̄| ≤ (q + 1) l ō/α
 //! one by one, and on average by that of the gap and (1.5 + (q + 1)/α)(l ō)²; the first counts times the shift of κ, the second times half
-//! of what κ varies by over the segment, as a constant is seen as it is. All of it counts times α.
+//! of what κ varies by over the segment, as a constant is seen as it is. All of it counts times α. Or else Ĉ = ∫ κ ρ e^{−λR} ds / ∫ ρ e^{−λR} ds
+//! over the values, λ = l/(s_b − s_f), of which only the ends and λ move: an error of ⅛ of both second derivatives, which follow from
+//! ∂Ĉ/∂s_b = (κ_b − Ĉ) h, h = λρ_b/(e^X − 1), ∂Ĉ/∂s_f = (Ĉ − κ_f) h, h = λρ_f/(1 − e^{−X}), and λ ∂Ĉ/∂λ = X dĈ/dX (below). With r = ρ/(ρ̂ d) at
+//! an end and r′ = ρ′/(ρ̂ d), h ≤ r and |∂h/∂s_b| ≤ r′ + r² behind; h ≤ r (1 + X) and |∂h/∂s_f| ≤ r′ (1 + X) + r² in front.
 //!
 //! Along the length, Ĉ depends on the depth X = lρ̂ alone: with z the share of the depth it is ∫ κ X e^{−Xz}/(1 − e^{−X}) dz, of which the
 //! factor's m-th derivative at X = 0 is, but for its sign, the Bernoulli polynomial B_m(z), and less beyond; so |dᵐĈ/dXᵐ| ≤ ½ ∫|B_m| of
@@ -70,6 +75,19 @@ struct Interval {
     /// By how much the chord of the integral of extinction is off, and its rise.
     bend: f64,
     rise: f64,
+    end: End,
+    /// The kink of extinction at the lower value, a quarter of its change of slope per texel; endless if it is a step. And gaps there.
+    kink: f64,
+    between: [f64; 2],
+}
+
+/// What is known of the function where segments of a cell end: the greatest extinction, and slopes of extinction and colours per texel,
+/// endless if there is a step.
+#[derive(Debug, Clone, Copy, Default)]
+struct End {
+    most: f64,
+    slope: f64,
+    slope_colour: f64,
 }
 
 /// What is known of the segments between four values, two neighbours in front and two behind.
@@ -85,9 +103,13 @@ struct Cell {
     most: f64,
     /// From what to what extinction and colours go in all of it.
     hull: [[f64; 2]; 4],
-    /// Least and greatest mean extinction of a segment, and by how much the texels' mean of it is off.
+    /// Least and greatest mean extinction of a segment, by how much the texels differ in it, and by how much their mean is off.
     density: [f64; 2],
+    spread: f64,
     off: f64,
+    /// Its two ends, and how many texels these are apart at least.
+    ends: [End; 2],
+    apart: f64,
 }
 
 /// The greatest error of a chord of 1 − e^{−x}, relative to 1.
@@ -134,37 +156,82 @@ impl Cell {
         if sum <= enough {
             return sum;
         }
+        // As of normalised tables; the filter's mean of αĈ is not that of α times that of Ĉ, and that of e^{−lρ̂} is curved.
+        let depth = longest * self.density[1];
+        let curve = (self.spread * self.spread / 8.0 * curved(self.density[0], longest)).min(1.0);
+        let mixed = depth.min(1.0) * self.bent(depth) + self.contrast() / 4.0 * (longest * self.spread).min(1.0);
+        let by_ends = mixed + brightest * (self.opacity(longest) + curve);
+        [self.hulls(longest), by_ends].iter().fold(sum, |m, &v| if v < m { v } else { m })
+    }
+
+    /// By how much segments of the hull differ, of lengths up to `longest`.
+    fn hulls(&self, longest: f64) -> f64 {
         let [density, colours @ ..] = &self.hull;
-        colours.iter().fold(apart(*density, [1.0; 2], longest), |m, c| m.max(apart(*density, *c, longest))).min(sum)
+        colours.iter().fold(apart(*density, [1.0; 2], longest), |m, c| m.max(apart(*density, *c, longest)))
+    }
+
+    /// The error of an opacity from the mean extinction.
+    fn opacity(&self, longest: f64) -> f64 {
+        let least = self.density[0];
+        let error = match least * longest > 1.0 {
+            true => self.off / (std::f64::consts::E * least),
+            false => self.off * longest * (-longest * least).exp(),
+        };
+        error.min(1.0)
+    }
+
+    /// Between texels, by how much the mean of Ĉ is off of which the second derivatives by its ends are known, `depth` being the greatest.
+    fn bent(&self, depth: f64) -> f64 {
+        let (d, contrast, thin) = (self.apart, self.contrast(), depth.min(1.0));
+        let e = std::f64::consts::E;
+        let of_length = (4.0 / (e * e) + 2.0 / e) * thin / (d * d);
+        let share = |of: f64| of / (self.density[0] * d);
+        let one_way = |front: &End, back: &End| {
+            let (r, bend) = (share(back.most), share(back.slope));
+            let behind = back.slope_colour * r + contrast * (2.0 * r * r + bend + 2.04 * r / d * thin + of_length);
+            let (r, bend, seen) = (share(front.most), share(front.slope), 1.0 + depth);
+            let moved = 2.0 * r / d * ((depth / 8.0).min(1.0 / e) * seen + depth);
+            let before = front.slope_colour * r * seen
+                + contrast * (r * r * (1.0 + seen * seen) + bend * seen + moved + of_length);
+            (behind + before) / 8.0
+        };
+        let [a, b] = &self.ends;
+        one_way(a, b).max(one_way(b, a))
     }
 
     /// The error of colour and opacity from a mean extinction and a mean colour, which along the length is off by `lengths` (of a depth)
-    /// of what it varies by, by `most` of it at most; what is off along the values counts `times`.
-    fn normalised(&self, longest: f64, lengths: impl Fn(f64) -> f64, most: f64, times: f64) -> f64 {
-        let [least, densest] = self.density;
-        let opacity = match least * longest > 1.0 {
-            true => self.off / (std::f64::consts::E * least),
-            false => self.off * longest * (-longest * least).exp(),
-        }
-        .min(1.0);
+    /// of what it varies by, and through whose points it goes with a Lebesgue constant of `times`.
+    fn normalised(&self, longest: f64, lengths: impl Fn(f64) -> f64, times: f64) -> f64 {
+        let ([least, densest], opacity) = (self.density, self.opacity(longest));
         let (depth, contrast) = (longest * densest, self.contrast());
         let alpha = depth.min(1.0);
         let hidden = 2.0 + depth.min(1.0);
         let seen = -(-longest * least).exp_m1();
         let (gap, shift) = ((longest * self.gap).min(self.over), (longest * self.shift).min(self.shift_over));
         let weights = hidden * gap + (1.5 + hidden / seen) * shift * shift;
-        let of_values = alpha * self.gap_colour
+        let by_weights = alpha * self.gap_colour
             + (1.0 + self.off / least) * (self.shift_colour * hidden * shift + contrast / 2.0 * weights);
-        // Without extinction there are no such weights.
-        let of_values = if of_values < alpha * contrast { of_values } else { alpha * contrast };
-        let colour = (times * of_values + alpha * contrast * lengths(depth)).min(alpha * contrast * most);
+        // Without extinction there is neither.
+        let of_values =
+            [by_weights, alpha * self.bent(depth)].iter().fold(alpha * contrast, |m, &v| if v < m { v } else { m });
+        let of_points = (times * of_values).min(of_values + times * alpha * contrast * depth / 4.0);
+        let most = ((1.0 + times) / 2.0).min(1.0 + (1.0 + times) * depth / 8.0);
+        let colour = (of_points + alpha * contrast * lengths(depth)).min(alpha * contrast * most);
         let brightest = self.hull[1..].iter().fold(1.0, |m: f64, c| m.max(c[1]));
-        colour + brightest * opacity
+        // Polynomials leave the hull of the colours.
+        let beyond = alpha * contrast * ((times - 1.0) / 2.0).min(times * depth / 8.0);
+        (colour + brightest * opacity).min(self.hulls(longest) + beyond)
     }
 }
 
-/// The greatest of `error`, which is told the greatest so far, over the cells of a table of `values`², and the greatest colour, at least 1.
-fn worst(exact: &Exact<f64>, values: u32, mut error: impl FnMut(&Cell, f64) -> f64) -> Option<[f64; 2]> {
+/// The greatest of `error`, which is told the greatest so far, over the cells of a table of `values`², as far as one is beyond `limit`; and
+/// the greatest colour, at least 1.
+fn worst(
+    exact: &Exact<f64>,
+    values: u32,
+    limit: f64,
+    mut error: impl FnMut(&Cell, f64) -> f64,
+) -> Option<[f64; 2]> {
     if !is_scalar(exact) || exact.direct || values < 3 {
         return None;
     }
@@ -172,8 +239,12 @@ fn worst(exact: &Exact<f64>, values: u32, mut error: impl FnMut(&Cell, f64) -> f
     let intervals = intervals(&exact.opacity, n);
     let mut sums = vec![0.0];
     intervals.iter().for_each(|k| sums.push(sums[sums.len() - 1] + k.rise));
+    let brightest = (1..4).flat_map(|c| exact.opacity.value.iter().map(move |v| v[c])).fold(1.0, f64::max);
     let mut greatest = 0.0f64;
     for i in 0..n {
+        if greatest > limit {
+            break;
+        }
         let (mut gaps, mut shifts) = (0.0, 0.0);
         let mut most = Interval { least: f64::INFINITY, own: [[f64::INFINITY, 0.0]; 4], ..Interval::default() };
         let (mut over, mut shift_over) = (0.0f64, 0.0f64);
@@ -201,47 +272,65 @@ fn worst(exact: &Exact<f64>, values: u32, mut error: impl FnMut(&Cell, f64) -> f
                 most: most.most,
                 hull: most.own,
                 density: most.own[0],
+                spread: most.own[0][1] - most.own[0][0],
                 off: 0.0,
+                ends: [intervals[i].end, k.end],
+                apart,
             };
             if i == j {
                 // Nothing beyond the interval is seen.
                 (cell.gap, cell.gap_colour, cell.least, cell.most) = (k.own_gap, k.own_gap_colour, k.own[0][0], k.own[0][1]);
                 cell.over = if k.own_gap > 0.0 { k.own_gap / k.own[0][0] } else { 0.0 };
             }
+            if j == i + 1 {
+                let before = &intervals[i];
+                cell.gap = cell.gap.min(before.own_gap + k.between[0] + k.own_gap);
+                cell.gap_colour = cell.gap_colour.min(before.own_gap_colour + k.between[1] + k.own_gap_colour);
+            }
             cell.off = cell.gap.min(cell.hull[0][1] - cell.hull[0][0]);
+            if j == i + 1 && intervals[i].own_gap == 0.0 && k.own_gap == 0.0 {
+                // One kink between two lines: a quarter of what is seen at the worst place.
+                cell.off = cell.off.min(k.kink / 4.0);
+            }
             if apart > 0.0 {
                 let mean = |a: usize, b: usize| (sums[j + b] - sums[i + a]) / (j + b - i - a) as f64;
                 let corners = [mean(0, 0), mean(0, 1), mean(1, 0), mean(1, 1)];
                 let [lo, hi] = corners.iter().fold([f64::INFINITY, 0.0], |[lo, hi]: [f64; 2], &v| [lo.min(v), hi.max(v)]);
                 cell.off = cell.off.min((intervals[i].bend + k.bend + (hi - lo) * 8f64.sqrt().recip()) / apart);
+                cell.spread = hi - lo;
                 cell.density = [(lo - cell.off).max(cell.density[0]), (hi + cell.off).min(cell.density[1])];
             }
             greatest = greatest.max(error(&cell, greatest));
         }
     }
-    let brightest = (1..4).flat_map(|c| exact.opacity.value.iter().map(move |v| v[c])).fold(1.0, f64::max);
     Some([greatest, brightest])
 }
 
 /// A bound on the error of a uniform table of `values`² × `slices` texels for segments of up to `longest` normalised units, looked up
 /// anywhere. `None` for fields of several components, for direct emission, which has no greatest colour, and for less than 3 values.
 pub fn bound(exact: &Exact<f64>, values: u32, slices: u32, longest: f64) -> Option<f64> {
-    let [of_values, brightest] = along_values(exact, values, longest)?;
+    let [of_values, brightest] = along_values(exact, values, longest, f64::INFINITY)?;
     Some((of_values + along_lengths(exact, slices, longest, brightest) + ROUNDING * brightest).min(brightest))
 }
 
-/// The same for [`Polynomial`]s of `degree` and `values`² texels.
+/// The same for [`Polynomial`]s of `degree`, 1 to 8, and `values`² texels.
 pub fn bound_of_polynomial(exact: &Exact<f64>, degree: u32, values: u32, longest: f64) -> Option<f64> {
-    let [slope, lebesgue] = *DEGREES.get(degree.checked_sub(1)? as usize)?;
-    let lengths = |depth: f64| slope * depth.powi(degree as i32 + 1);
-    let most = (1.0 + lebesgue) / 2.0;
-    let [error, brightest] =
-        worst(exact, values, |cell, _| cell.normalised(longest, lengths, most, lebesgue))?;
-    Some((error + ROUNDING * brightest * lebesgue).min(brightest * (1.0 + lebesgue) / 2.0))
+    of_polynomial(exact, degree, values, longest, f64::INFINITY)
 }
 
 /// The same for logarithmic lengths, normalised: [`Kind::LogNormalised`], of `values`² × `slices` texels.
 pub fn bound_of_normalised(exact: &Exact<f64>, values: u32, slices: u32, longest: f64) -> Option<f64> {
+    of_normalised(exact, values, slices, longest, f64::INFINITY)
+}
+
+fn of_polynomial(exact: &Exact<f64>, degree: u32, values: u32, longest: f64, limit: f64) -> Option<f64> {
+    let [slope, lebesgue] = *DEGREES.get(degree.checked_sub(1)? as usize)?;
+    let lengths = |depth: f64| slope * depth.powi(degree as i32 + 1);
+    let [error, brightest] = worst(exact, values, limit, |cell, _| cell.normalised(longest, lengths, lebesgue))?;
+    Some((error + ROUNDING * brightest * lebesgue).min(brightest * (1.0 + lebesgue) / 2.0))
+}
+
+fn of_normalised(exact: &Exact<f64>, values: u32, slices: u32, longest: f64, limit: f64) -> Option<f64> {
     const OCTAVE: f64 = std::f64::consts::LN_2 * std::f64::consts::LN_2 / 8.0;
     // From no length to the thinnest slice it is linear in the length.
     let thinnest = super::length(Kind::LogNormalised, slices.max(3), 1.0, 1);
@@ -250,7 +339,7 @@ pub fn bound_of_normalised(exact: &Exact<f64>, values: u32, slices: u32, longest
         let octave = OCTAVE * ((0.125 * depth).min(1.0 / e) + (0.0321 * depth * depth).min(4.0 / (e * e)));
         octave.max(DEGREES[0][0] * (thinnest * depth).powi(2))
     };
-    let [error, brightest] = worst(exact, values, |cell, _| cell.normalised(longest, lengths, 1.0, 1.0))?;
+    let [error, brightest] = worst(exact, values, limit, |cell, _| cell.normalised(longest, lengths, 1.0))?;
     Some((error + ROUNDING * brightest).min(brightest))
 }
 
@@ -258,10 +347,10 @@ pub fn bound_of_normalised(exact: &Exact<f64>, values: u32, slices: u32, longest
 /// `None` as [`bound`].
 pub fn size(exact: &Exact<f64>, longest: f64, error: f64) -> Option<[u32; 3]> {
     let [mut n, mut slices] = [16, 8];
-    let mut of_values = along_values(exact, n, longest)?;
+    let mut of_values = along_values(exact, n, longest, error)?;
     while n < 256 && of_values[0] > error / 2.0 {
         n *= 2;
-        of_values = along_values(exact, n, longest)?;
+        of_values = along_values(exact, n, longest, error)?;
     }
     while slices < 128 && along_lengths(exact, slices, longest, of_values[1]) > error / 2.0 {
         slices *= 2;
@@ -269,10 +358,25 @@ pub fn size(exact: &Exact<f64>, longest: f64, error: f64) -> Option<[u32; 3]> {
     Some([n, n, slices])
 }
 
-/// The bound along the values, and the greatest colour.
-fn along_values(exact: &Exact<f64>, values: u32, longest: f64) -> Option<[f64; 2]> {
-    let brightest = worst(exact, values.min(3), |_, _| 0.0)?[1];
-    worst(exact, values, |cell, enough| cell.published(longest, brightest, enough))
+/// The fewest of the powers of 2 from 64 to `most` values whose bound is `error` for polynomials of `degree`; `None` if none is.
+pub fn values_of_polynomial(exact: &Exact<f64>, degree: u32, longest: f64, error: f64, most: u32) -> Option<u32> {
+    fewest(most, error, |n| of_polynomial(exact, degree, n, longest, error))
+}
+
+/// The same for logarithmic lengths, normalised.
+pub fn values_of_normalised(exact: &Exact<f64>, slices: u32, longest: f64, error: f64, most: u32) -> Option<u32> {
+    fewest(most, error, |n| of_normalised(exact, n, slices, longest, error))
+}
+
+fn fewest(most: u32, error: f64, bound: impl Fn(u32) -> Option<f64>) -> Option<u32> {
+    let sizes = std::iter::successors(Some(64), |n| Some(2 * n)).take_while(|&n| n <= most);
+    sizes.into_iter().find(|&n| bound(n).is_some_and(|b| b <= error))
+}
+
+/// The bound along the values, as far as it is beyond `limit`, and the greatest colour.
+fn along_values(exact: &Exact<f64>, values: u32, longest: f64, limit: f64) -> Option<[f64; 2]> {
+    let brightest = worst(exact, values.min(3), 0.0, |_, _| 0.0)?[1];
+    worst(exact, values, limit, |cell, enough| cell.published(longest, brightest, enough))
 }
 
 fn along_lengths(exact: &Exact<f64>, slices: u32, longest: f64, brightest: f64) -> f64 {
@@ -288,6 +392,7 @@ fn intervals(knots: &Knots<f64>, n: usize) -> Vec<Interval> {
     let mut steep = vec![[0.0f64; 4]; n];
     let mut range = vec![[[f64::INFINITY, f64::NEG_INFINITY]; 4]; n];
     let mut rise = vec![0.0f64; n];
+    let mut stepped = vec![[false; 4]; n];
     // From what to what steps at the values go: a texel may hold either.
     let mut steps = vec![[[f64::INFINITY, f64::NEG_INFINITY]; 4]; n + 1];
     let per_texel = 2.0 / n as f64;
@@ -316,6 +421,11 @@ fn intervals(knots: &Knots<f64>, n: usize) -> Vec<Interval> {
         }
         if k == 0 || s[0] <= -1.0 || s[0] >= 1.0 {
             continue;
+        }
+        if !node && s[0] == s[1] {
+            for (c, stepped) in stepped[x0 as usize].iter_mut().enumerate() {
+                *stepped |= knots.value[k + 1][c] != knots.value[k][c];
+            }
         }
         let of = if node { &mut at_end[(x0.round() as usize).min(n - 1)] } else { &mut inside[x0 as usize] };
         for (c, of) in of.iter_mut().enumerate() {
@@ -367,6 +477,13 @@ fn intervals(knots: &Knots<f64>, n: usize) -> Vec<Interval> {
             own,
             bend: varied / if inside[i][0] > 0.0 { 4.0 } else { 8.0 },
             rise: rise[i],
+            end: End {
+                most: own[0][1],
+                slope: if stepped[i][0] { f64::INFINITY } else { steep[i][0] },
+                slope_colour: colours(&|c| if stepped[i][c] { f64::INFINITY } else { steep[i][c] }),
+            },
+            kink: if steps[i][0][1] > steps[i][0][0] { f64::INFINITY } else { at_end[i][0] },
+            between: [at_end[i][0], colours(&|c| at_end[i][c])],
         }
     };
     (0..n).map(interval).collect()

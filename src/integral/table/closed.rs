@@ -96,28 +96,28 @@ impl Weights {
         falling: [[0.0; AT_ONCE]; 2],
     };
 
-    /// As [`Piece::new`], both ways, for depths that `rule` is for. Takes no decisions, so that it becomes vector instructions.
+    /// As [`Piece::new`], both ways, for depths that `rule` is for. Takes no decisions and a node at a time, so that it becomes vector
+    /// instructions.
     #[inline(always)]
     fn integrate<const N: usize, const SHALLOW: bool, const DIRECT: bool>(&mut self, rule: &[[f64; 2]; N]) {
+        let Weights { x, y, alpha, rising: [rising_front, rising_back], falling: [falling_front, falling_back] } = self;
+        for of in [&mut *alpha, rising_front, rising_back, falling_front, falling_back] {
+            of.fill(0.0);
+        }
         let fade = |t: f32| if SHALLOW { 1.0 - t * slope_of_opacity(t) } else { Real::exp(-t) };
-        for q in 0..AT_ONCE {
-            let (x, y) = (self.x[q], self.y[q]);
-            let (rise, whole) = (y - x, (x + y) * 0.5);
-            let (mut alpha, mut rising, mut falling) = (0.0, [0.0; 2], [0.0; 2]);
-            for [u, weight] in rule {
-                let (u, weight) = (*u as f32, *weight as f32);
-                let (slope, depth) = (x + rise * u, (x + rise * u * 0.5) * u);
-                let seen = [depth, whole - depth].map(|t| fade(t) * weight);
-                alpha += slope * seen[0];
-                let emitted = seen.map(|seen| if DIRECT { seen } else { slope * seen });
-                for (end, share) in [1.0 - u, u].into_iter().enumerate() {
-                    rising[end] += share * emitted[0];
-                    falling[end] += share * emitted[1];
-                }
-            }
-            self.alpha[q] = alpha;
-            for end in 0..2 {
-                (self.rising[end][q], self.falling[end][q]) = (rising[end], falling[end]);
+        for [u, weight] in rule {
+            let (u, weight) = (*u as f32, *weight as f32);
+            for q in 0..AT_ONCE {
+                let rise = (y[q] - x[q]) * u;
+                let (slope, depth) = (x[q] + rise, (x[q] + rise * 0.5) * u);
+                let (rising, falling) = (fade(depth) * weight, fade((x[q] + y[q]) * 0.5 - depth) * weight);
+                let absorbed = slope * rising;
+                let [rising, falling] = if DIRECT { [rising, falling] } else { [absorbed, slope * falling] };
+                alpha[q] += absorbed;
+                rising_front[q] += (1.0 - u) * rising;
+                rising_back[q] += u * rising;
+                falling_front[q] += (1.0 - u) * falling;
+                falling_back[q] += u * falling;
             }
         }
     }

@@ -137,10 +137,12 @@ impl Polynomial {
         // written by one thread and read by another.
         let runs = Runs::new(grid, lengths);
         let band = (BAND / n).clamp(1, n);
-        let mut sheared = vec![[[[0.0f32; 4]; P]; 2]; n * band];
+        // Not as many as a power of 2, as then all distances of a texel would have one place in the cache.
+        let stride = n + 3;
+        let mut sheared = vec![[[[0.0f32; 4]; P]; 2]; stride * band];
         for first in (0..n).step_by(band) {
             let count = band.min(n - first);
-            sheared[..n * count].par_chunks_mut(n).enumerate().for_each_init(
+            sheared[..stride * count].par_chunks_mut(stride).enumerate().for_each_init(
                 || (runs.scratch(), vec![Both::NOTHING; n]),
                 |(scratch, segments), (d, sheared)| {
                     let d = first + d;
@@ -152,13 +154,12 @@ impl Polynomial {
                 },
             );
             by_row.par_iter_mut().enumerate().for_each(|(j, rows)| {
-                for d in first..(first + count).min(n - j) {
-                    let [_, falling] = &sheared[(d - first) * n + j];
-                    rows.iter_mut().zip(falling).for_each(|(row, texel)| row[j + d] = *texel);
-                }
-                for d in first..(first + count).min(j + 1) {
-                    let [rising, _] = &sheared[(d - first) * n + j - d];
-                    rows.iter_mut().zip(rising).for_each(|(row, texel)| row[j - d] = *texel);
+                for (c, row) in rows.iter_mut().enumerate() {
+                    let falling = sheared[j..].iter().step_by(stride).map(|of| of[1][c]);
+                    row[j..].iter_mut().skip(first).zip(falling.take(count)).for_each(|(to, texel)| *to = texel);
+                    for d in first..(first + count).min(j + 1) {
+                        row[j - d] = sheared[(d - first) * stride + j - d][0][c];
+                    }
                 }
             });
         }

@@ -354,45 +354,43 @@ fn cheaper_texels_cost_what_they_should() {
     assert!(rms[0] > 20.0 * rms[1], "{rms:?}");
 }
 
-/// The greatest error that is seen of a look-up, of any segment and of those near the diagonal.
-fn greatest_error(exact: &Exact<f64>, n: u32, longest: f64, look_up: impl Fn(f64, f64, f64) -> [f64; 4]) -> f64 {
-    let mut most = 0.0f64;
-    for (i, [front, back, l]) in segments().enumerate() {
-        // Half of them within two texels of the diagonal, where functions are seen as they are.
-        let back = if i % 2 == 0 { back } else { (front + 4.0 * back / f64::from(n)).clamp(-1.0, 1.0) };
-        let (got, want) = (look_up(front, back, longest * l), published(exact, front, back, longest * l));
-        most = (0..4).fold(most, |m, k| m.max((got[k] - want[k]).abs()));
-    }
-    most
-}
-
 /// The greatest error that is seen is within the bound, and the bound is not idle.
 #[test]
 fn errors_are_within_their_bounds() {
+    let long = std::env::var("HALITE_LONG").is_ok_and(|v| v == "1");
     let mut wrong = vec![];
-    for seed in [77, 1, 2, 3] {
+    for seed in if long { 1..13 } else { 1..3 } {
         for (name, exact) in functions_of(seed).into_iter().filter(|(_, e)| !e.direct) {
-            let mut hold = |what: String, seen: f64, bound: f64| {
-                let share = seen / bound;
-                eprintln!("{seed} {name}, {what}: {seen:.2e} of {bound:.2e}: {share:.3}");
-                if !(0.05..=1.0).contains(&share) {
-                    wrong.push(format!("{seed} {name}, {what}: {seen:.2e} of {bound:.2e}: {share:.3}"));
-                }
-            };
             // Of 256 values, entries are at texels, and so are some steps and ramps.
             for (n, slices, longest) in
                 [(32, 17, 2.0), (64, 33, 2.0), (128, 65, 2.0), (64, 17, 0.05), (200, 9, 0.05), (256, 33, 2.0), (256, 9, 0.05)]
             {
+                // Half of them within two texels of the diagonal, where functions are seen as they are.
+                let near = |i: usize, f: f64, b: f64| if i % 2 == 0 { b } else { (f + 4.0 * b / f64::from(n)).clamp(-1.0, 1.0) };
+                let judged = |(i, [f, b, l]): (usize, [f64; 3])| {
+                    let (b, l) = (near(i, f, b), longest * l);
+                    ([f, b, l], published(&exact, f, b, l))
+                };
+                let truth: Vec<_> = segments().enumerate().map(judged).collect();
+                let mut hold = |what: &str, bound: Option<f64>, least: f64, look_up: &dyn Fn(f64, f64, f64) -> [f64; 4]| {
+                    let seen = truth.iter().fold(0.0, |most: f64, ([f, b, l], want)| {
+                        let got = look_up(*f, *b, *l);
+                        (0..4).fold(most, |m, k| m.max((got[k] - want[k]).abs()))
+                    });
+                    let share = seen / bound.unwrap();
+                    if !(least..=1.0).contains(&share) {
+                        wrong.push(format!("{seed} {name}, {what}, {n}, {longest}: {seen:.2e}, which is {share:.3} of it"));
+                    }
+                };
                 let table = Table::closed(&exact, Kind::Uniform, [n, n, slices], longest).unwrap();
-                let seen = greatest_error(&exact, n, longest, |f, b, l| table.look_up(f, b, l));
-                hold(format!("uniform, {n}, {longest}"), seen, table.bound(&exact).unwrap());
+                hold("uniform", table.bound(&exact), 0.05, &|f, b, l| table.look_up(f, b, l));
+                // So few texels for a ramp that what is seen of its slope is no difference but a jump.
+                let least = if n == 32 { 0.02 } else { 0.05 };
                 let table = Table::closed(&exact, Kind::LogNormalised, [n, n, 12], longest).unwrap();
-                let seen = greatest_error(&exact, n, longest, |f, b, l| table.look_up(f, b, l));
-                hold(format!("normalised, {n}, {longest}"), seen, table.bound(&exact).unwrap());
+                hold("normalised", table.bound(&exact), least, &|f, b, l| table.look_up(f, b, l));
                 for degree in [1, 2, 4] {
                     let table = Polynomial::closed(&exact, degree, n, longest).unwrap();
-                    let seen = greatest_error(&exact, n, longest, |f, b, l| table.look_up(f, b, l));
-                    hold(format!("degree {degree}, {n}, {longest}"), seen, table.bound(&exact).unwrap());
+                    hold(&format!("degree {degree}"), table.bound(&exact), least, &|f, b, l| table.look_up(f, b, l));
                 }
             }
         }
@@ -406,4 +404,14 @@ fn sizes_keep_to_their_error() {
     let [n, _, slices] = size(&ramps, 2.0, 0.2).unwrap();
     assert!(bound(&ramps, n, slices, 2.0).unwrap() <= 0.2 + 1e-5, "{n} {slices}");
     assert!(bound(&ramps, n / 2, slices, 2.0).unwrap() > 0.1, "{n} {slices}");
+    let found = [values_of_polynomial(&ramps, 2, 2.0, 0.1, 512), values_of_normalised(&ramps, 16, 2.0, 0.1, 512)];
+    for (which, n) in found.into_iter().enumerate() {
+        let bound = |n| match which {
+            0 => bound_of_polynomial(&ramps, 2, n, 2.0).unwrap(),
+            _ => bound_of_normalised(&ramps, n, 16, 2.0).unwrap(),
+        };
+        let n = n.unwrap();
+        assert!(bound(n) <= 0.1 && bound(n / 2) > 0.1, "{n}");
+    }
+    assert_eq!(values_of_polynomial(&ramps, 2, 2.0, 1e-9, 128), None);
 }
