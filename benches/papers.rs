@@ -263,7 +263,9 @@ fn seconds_of_polynomials() {
 /// What Halite itself asks for: 256 entries, to an RMS error of 1e-3, within 100 ms and 20 ms on two cores.
 fn targets() {
     println!("\nClosed form on the CPU, 256 entries (asked for: 0.1 s of the volume, 0.02 s of degree 2)");
-    println!("(new, and in the memory of the table before; seconds: the best and the median, and those of all processors)\n");
+    println!(
+        "(new, and in the memory of the table before; seconds: the best and the median, and those of all processors)\n"
+    );
     println!("table                  new: best   median     CPU     in place: best   median     CPU   RMS of texels");
     let transfer = function(256);
     let exact = exact(&transfer);
@@ -282,7 +284,12 @@ fn targets() {
         let fresh = took(50, || Polynomial::closed(&exact, degree, 512, LONGEST));
         let mut table = Polynomial::closed(&exact, degree, 512, LONGEST).expect("a table");
         let again = took(50, || table.rebuild(&exact));
-        row(&format!("512x512, degree {degree}"), fresh, again, format!("{:.1e}", judged_polynomial(&transfer, &table)));
+        row(
+            &format!("512x512, degree {degree}"),
+            fresh,
+            again,
+            format!("{:.1e}", judged_polynomial(&transfer, &table)),
+        );
     }
 }
 

@@ -3,14 +3,13 @@
 #![allow(
     clippy::expect_used,
     clippy::unwrap_used,
-    clippy::panic,
     clippy::print_stderr,
     reason = "a test fails by panicking, and tells what it measured"
 )]
 
 mod common;
 
-use common::Scene;
+use common::{Scene, set};
 use glam::{DVec3, dvec3};
 use halite::field::Association;
 use halite::gpu::DeviceChoice;
@@ -26,25 +25,12 @@ use halite::transfer::{Emission, TransferFunction};
 use halite::view::{Blend, Camera, Projection, View};
 use std::path::Path;
 
-/// A renderer with each engine, on `HALITE_TEST_DEVICE` or the first device; without any, the CPU's alone, which is said.
+/// A renderer with each engine, if there is a device; without any, the CPU's alone.
 fn renderers() -> Vec<(&'static str, Renderer)> {
-    let name = std::env::var("HALITE_TEST_DEVICE").unwrap_or_else(|_| "0".into());
-    let choice = DeviceChoice::Named(name);
-    let mut all = vec![("cpu", Renderer::with_device(2, DeviceChoice::Cpu).unwrap())];
-    for (engine, name) in [(Engine::Traverse, "traverse"), (Engine::Project, "project")] {
-        match Renderer::with_engine(2, choice.clone(), engine) {
-            Ok(renderer) => all.push((name, renderer)),
-            Err(e) if std::env::var("HALITE_REQUIRE_GPU").is_ok_and(|v| v == "1") => panic!("{e}"),
-            Err(e) => eprintln!("SKIPPED, as there is no device to test: {e}"),
-        }
-    }
-    all
-}
-
-fn set(renderer: &mut Renderer, scene: &Scene) {
-    renderer.set_mesh(&scene.mesh, scene.tetrahedra.clone());
-    renderer.set_field(&scene.field).unwrap();
-    renderer.set_transfer(&scene.transfer);
+    let cpu = Renderer::with_device(2, DeviceChoice::Cpu).unwrap();
+    let others = [(Engine::Traverse, "traverse"), (Engine::Project, "project")];
+    let opened = others.into_iter().filter_map(|(engine, name)| Some((name, common::on_device(engine)?)));
+    std::iter::once(("cpu", cpu)).chain(opened).collect()
 }
 
 fn image(renderer: &mut Renderer, choice: Choice, view: &View) -> Image {

@@ -394,7 +394,20 @@ mod tests {
                 ($($field:ident),*) => { [$((stringify!($field), std::mem::offset_of!(Job, $field))),*] };
             }
             let want = offsets!(
-                size, slices, first, normalised, entries, samples, oversampling, most, longest, degree, count, pitch, lengths, weights
+                size,
+                slices,
+                first,
+                normalised,
+                entries,
+                samples,
+                oversampling,
+                most,
+                longest,
+                degree,
+                count,
+                pitch,
+                lengths,
+                weights
             );
             assert_eq!(got, want);
         }

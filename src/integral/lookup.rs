@@ -101,8 +101,7 @@ impl Lookup {
             | Stored::Cylindrical(Cylindrical { longest, .. }) => *longest,
         };
         let inverse = (1.0 / unit) as f32;
-        let mut table =
-            Lookup { choice: *choice, ranges: vec![], stored, direct: exact.direct, inverse, source: None };
+        let mut table = Lookup { choice: *choice, ranges: vec![], stored, direct: exact.direct, inverse, source: None };
         table.round();
         Ok(table)
     }
@@ -261,9 +260,7 @@ fn sized(exact: &Exact<f64>, choice: &Choice, longest: f64) -> Result<[u32; 3]> 
         let [front, _, depth] = size;
         // Fewer values than the knots ask for, where that is known to be enough.
         let fewer = match (choice.form, choice.lengths) {
-            (Form::Polynomial, _) => {
-                table::values_of_polynomial(exact, choice.degree, longest, SMALL_ERROR, front / 2)
-            }
+            (Form::Polynomial, _) => table::values_of_polynomial(exact, choice.degree, longest, SMALL_ERROR, front / 2),
             (Form::Volume, Kind::LogNormalised) => {
                 table::values_of_normalised(exact, depth, longest, SMALL_ERROR, front / 2)
             }

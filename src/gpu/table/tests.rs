@@ -117,8 +117,11 @@ fn devices_look_up_what_they_built() {
         );
         let function = crate::gpu::function::upload(&gpu, &narrow).unwrap();
         let builder = Builder::new(&gpu, direct).unwrap();
-        let volumes = [Kind::Uniform, Kind::Log, Kind::LogNormalised]
-            .map(|lengths| Choice { lengths, table: Some([17, 17, 8]), ..Choice::of(Form::Volume) });
+        let volumes = [Kind::Uniform, Kind::Log, Kind::LogNormalised].map(|lengths| Choice {
+            lengths,
+            table: Some([17, 17, 8]),
+            ..Choice::of(Form::Volume)
+        });
         for choice in choices().into_iter().filter(|c| c.planes == Planes::Two).chain(volumes) {
             let table = Lookup::outline(&exact, &choice, 2.0).unwrap();
             let on_device = OnDevice::building(&gpu, &table, &exact, &builder, &function);

@@ -159,7 +159,7 @@ impl Cell {
         // As of normalised tables; the filter's mean of αĈ is not that of α times that of Ĉ, and that of e^{−lρ̂} is curved.
         let depth = longest * self.density[1];
         let curve = (self.spread * self.spread / 8.0 * curved(self.density[0], longest)).min(1.0);
-        let mixed = depth.min(1.0) * self.bent(depth) + self.contrast() / 4.0 * (longest * self.spread).min(1.0);
+        let mixed = depth.min(1.0) * self.bent(depth) + self.moved(depth) / 4.0 * (longest * self.spread).min(1.0);
         let by_ends = mixed + brightest * (self.opacity(longest) + curve);
         [self.hulls(longest), by_ends].iter().fold(sum, |m, &v| if v < m { v } else { m })
     }
@@ -178,6 +178,15 @@ impl Cell {
             false => self.off * longest * (-longest * least).exp(),
         };
         error.min(1.0)
+    }
+
+    /// By how much Ĉ differs over the cell, by its first derivatives.
+    fn moved(&self, depth: f64) -> f64 {
+        let share = |end: &End| end.most / (self.density[0] * self.apart);
+        let ends = self.ends.iter().map(share).sum::<f64>() * (1.0 + depth);
+        let lengths = 2.0 * (depth / 8.0).min(1.0 / std::f64::consts::E) / self.apart;
+        let all = ends + lengths;
+        self.contrast() * if all < 1.0 { all } else { 1.0 }
     }
 
     /// Between texels, by how much the mean of Ĉ is off of which the second derivatives by its ends are known, `depth` being the greatest.
@@ -226,12 +235,7 @@ impl Cell {
 
 /// The greatest of `error`, which is told the greatest so far, over the cells of a table of `values`², as far as one is beyond `limit`; and
 /// the greatest colour, at least 1.
-fn worst(
-    exact: &Exact<f64>,
-    values: u32,
-    limit: f64,
-    mut error: impl FnMut(&Cell, f64) -> f64,
-) -> Option<[f64; 2]> {
+fn worst(exact: &Exact<f64>, values: u32, limit: f64, mut error: impl FnMut(&Cell, f64) -> f64) -> Option<[f64; 2]> {
     if !is_scalar(exact) || exact.direct || values < 3 {
         return None;
     }
@@ -279,7 +283,8 @@ fn worst(
             };
             if i == j {
                 // Nothing beyond the interval is seen.
-                (cell.gap, cell.gap_colour, cell.least, cell.most) = (k.own_gap, k.own_gap_colour, k.own[0][0], k.own[0][1]);
+                (cell.gap, cell.gap_colour, cell.least, cell.most) =
+                    (k.own_gap, k.own_gap_colour, k.own[0][0], k.own[0][1]);
                 cell.over = if k.own_gap > 0.0 { k.own_gap / k.own[0][0] } else { 0.0 };
             }
             if j == i + 1 {
@@ -295,7 +300,8 @@ fn worst(
             if apart > 0.0 {
                 let mean = |a: usize, b: usize| (sums[j + b] - sums[i + a]) / (j + b - i - a) as f64;
                 let corners = [mean(0, 0), mean(0, 1), mean(1, 0), mean(1, 1)];
-                let [lo, hi] = corners.iter().fold([f64::INFINITY, 0.0], |[lo, hi]: [f64; 2], &v| [lo.min(v), hi.max(v)]);
+                let [lo, hi] =
+                    corners.iter().fold([f64::INFINITY, 0.0], |[lo, hi]: [f64; 2], &v| [lo.min(v), hi.max(v)]);
                 cell.off = cell.off.min((intervals[i].bend + k.bend + (hi - lo) * 8f64.sqrt().recip()) / apart);
                 cell.spread = hi - lo;
                 cell.density = [(lo - cell.off).max(cell.density[0]), (hi + cell.off).min(cell.density[1])];
@@ -416,7 +422,9 @@ fn intervals(knots: &Knots<f64>, n: usize) -> Vec<Interval> {
         if node && s[0] == s[1] {
             let m = x0.round() as usize;
             for (c, step) in steps[m].iter_mut().enumerate() {
-                *step = [knots.value[k][c], knots.value[k + 1][c]].iter().fold(*step, |[lo, hi], &v| [lo.min(v), hi.max(v)]);
+                *step = [knots.value[k][c], knots.value[k + 1][c]]
+                    .iter()
+                    .fold(*step, |[lo, hi], &v| [lo.min(v), hi.max(v)]);
             }
         }
         if k == 0 || s[0] <= -1.0 || s[0] >= 1.0 {
