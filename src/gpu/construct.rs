@@ -1,7 +1,7 @@
 //! Pre-integrated tables, built on a device: the same texels as `integral::table` has, in `shaders/construct.wgsl`.
 //!
-//! A `Plan` says what is dispatched for a table; `Builder` does it, and leaves the texels on the device. What draws copies them into its
-//! texture there ([`super::table`]), and [`Constructor`] hands them back, to be judged.
+//! A `Plan` says what is dispatched for a table; `Builder` does it, and leaves the texels on the device. What draws
+//! copies them into its texture there ([`super::table`]), and [`Constructor`] hands them back, to be judged.
 
 use super::buffers::Buffer;
 use super::raster::{self, Readback, Slot};
@@ -97,8 +97,8 @@ impl Job {
 }
 
 impl Plan {
-    /// A table of three parameters. `None` as [`Table::new`], unless there are as many values behind as in front, and for what a
-    /// construction does not know.
+    /// A table of three parameters. `None` as [`Table::new`], unless there are as many values behind as in front, and
+    /// for what a construction does not know.
     fn volume(
         exact: &Exact<f64>,
         kind: Kind,
@@ -213,8 +213,8 @@ impl Builder {
         self.direct == exact.direct
     }
 
-    /// Has the device build `stored` of the function `exact`, which `function` tells it; it may take its time. Rows are so far apart that
-    /// they can be copied to textures. None if it cannot, or has no binding so large.
+    /// Has the device build `stored` of the function `exact`, which `function` tells it; it may take its time. Rows are
+    /// so far apart that they can be copied to textures. None if it cannot, or has no binding so large.
     ///
     /// # Errors
     /// [`crate::Error::Memory`] if the device has no room, and those of a device that fails.
@@ -290,8 +290,9 @@ pub struct Constructor {
 }
 
 impl Constructor {
-    /// Opens what `choice` says, for tables of `transfer` over a field of one component that `normal` maps, on a mesh whose coordinates
-    /// were multiplied by `scale`. None if `choice` is the CPU, or there is no GPU and none was named.
+    /// Opens what `choice` says, for tables of `transfer` over a field of one component that `normal` maps, on a mesh
+    /// whose coordinates were multiplied by `scale`. None if `choice` is the CPU, or there is no GPU and none was
+    /// named.
     ///
     /// # Errors
     /// [`crate::Error::Device`] if no adapter bears the name, it is of no use, or it cannot be opened.
@@ -313,8 +314,8 @@ impl Constructor {
         &self.gpu.adapter.name
     }
 
-    /// A table of three parameters, and the milliseconds that the device took, without the way back. `None` as [`Table::new`], unless
-    /// there are as many values behind as in front, and for what a construction does not know.
+    /// A table of three parameters, and the milliseconds that the device took, without the way back. `None` as
+    /// [`Table::new`], unless there are as many values behind as in front, and for what a construction does not know.
     ///
     /// # Errors
     /// [`crate::Error::Memory`] if the device has no room, and those of a device that fails.
@@ -330,7 +331,8 @@ impl Constructor {
         Ok(Some((Table { kind, size, longest, direct: self.exact.direct, texels }, ms)))
     }
 
-    /// Polynomials in closed form, and the milliseconds that the device took. `None` as [`Polynomial::new`], and for degrees beyond 4.
+    /// Polynomials in closed form, and the milliseconds that the device took. `None` as [`Polynomial::new`], and for
+    /// degrees beyond 4.
     ///
     /// # Errors
     /// As [`Self::volume`].
@@ -340,7 +342,8 @@ impl Constructor {
         Ok(Some((Polynomial { degree, size, longest, direct: self.exact.direct, texels }, ms)))
     }
 
-    /// A table in cylinder coordinates, in closed form, and the milliseconds that the device took. `None` as [`Cylindrical::new`].
+    /// A table in cylinder coordinates, in closed form, and the milliseconds that the device took. `None` as
+    /// [`Cylindrical::new`].
     ///
     /// # Errors
     /// As [`Self::volume`].
@@ -349,7 +352,8 @@ impl Constructor {
         Ok(Some((Cylindrical { planes, size, longest, texels }, ms)))
     }
 
-    /// The texels of a plan, and the time until they were there. None without a plan, and if a binding has no room for them.
+    /// The texels of a plan, and the time until they were there. None without a plan, and if a binding has no room for
+    /// them.
     fn run(&self, plan: Option<Plan>) -> Result<Option<(Vec<[f32; 4]>, f64)>> {
         let Some(plan) = plan else { return Ok(None) };
         let (gpu, start) = (&self.gpu, Instant::now());

@@ -1,8 +1,8 @@
 //! Tables, built while frames are drawn.
 //!
-//! A frame that cannot wait is drawn with the exact integral until its table is there: it is never of another function than it
-//! should be. Tables that the device builds are there as soon as they were asked for, as it does one thing after another; that is asked
-//! for after the frame that did not wait.
+//! A frame that cannot wait is drawn with the exact integral until its table is there: it is never of another function
+//! than it should be. Tables that the device builds are there as soon as they were asked for, as it does one thing
+//! after another; that is asked for after the frame that did not wait.
 
 use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Values};
@@ -50,8 +50,8 @@ impl Key {
 }
 
 impl Tables {
-    /// The table of `key`; none if it is not there yet, and the caller does not `wait` for it. `own` is the pool of a caller
-    /// that waits.
+    /// The table of `key`; none if it is not there yet, and the caller does not `wait` for it. `own` is the pool of a
+    /// caller that waits.
     ///
     /// # Errors
     /// Those of [`Lookup::new`].
@@ -71,8 +71,8 @@ impl Tables {
         Ok(None)
     }
 
-    /// Begins to build the table of `key`, unless it is there; after the frame that it was too late for, so that it does not
-    /// take that frame's time. `own` is the caller's pool.
+    /// Begins to build the table of `key`, unless it is there; after the frame that it was too late for, so that it
+    /// does not take that frame's time. `own` is the caller's pool.
     ///
     /// # Errors
     /// [`Error::Render`] if no thread can be started.
@@ -136,7 +136,8 @@ impl Tables {
     }
 }
 
-/// How many knots of the function the values of the mean cell have between them; of a sample, where there are many cells.
+/// How many knots of the function the values of the mean cell have between them; of a sample, where there are many
+/// cells.
 pub(super) fn knots_in_cells(geometry: &Geometry, values: &Values<1>, exact: &Exact<f32>) -> f64 {
     let knots = exact.opacity.places();
     let step = geometry.cells.len().div_ceil(SAMPLES).max(1);

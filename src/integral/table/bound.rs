@@ -1,44 +1,50 @@
-//! How far tables may be off between their texels: bounds on the greatest error of any channel, from the function and the size alone.
+//! How far tables may be off between their texels: bounds on the greatest error of any channel, from the function and
+//! the size alone.
 //!
-//! A linear filter weighs the texels around a segment. *Along the values*, the scalar of the four segments around is on average that of
-//! the segment meant. Their mean of a function that is linear is so too; at a kink it is off by at most a quarter of the change of slope
-//! per texel (Peano's kernel), at a step by its height, and never by more than the function varies over three texels: the *gap* g of ρ,
-//! and of κ. A *shift* o is how much the function varies over one texel. Means over a segment have bars; sums over it grow like l ḡ
-//! while little is hidden, and end at g/ρ, as what hides is ρ itself. All is found for each cell of four texels, of which that counts
-//! which says most.
+//! A linear filter weighs the texels around a segment. *Along the values*, the scalar of the four segments around is on
+//! average that of the segment meant. Their mean of a function that is linear is so too; at a kink it is off by at most
+//! a quarter of the change of slope per texel (Peano's kernel), at a step by its height, and never by more than the
+//! function varies over three texels: the *gap* g of ρ, and of κ. A *shift* o is how much the function varies over one
+//! texel. Means over a segment have bars; sums over it grow like l ḡ while little is hidden, and end at g/ρ, as what
+//! hides is ρ itself. All is found for each cell of four texels, of which that counts which says most.
 //!
-//! **A uniform volume** keeps premultiplied colour C = ∫ κ dA, over the opacity A gathered so far. With κ₀ the greatest colour (at
-//! least 1), from C − C̄ = Σ w (κ − κ̄)(dA − dĀ) + (κ̄ − κ) dĀ + κ (dĀ − dA), a cell is off by at most
+//! **A uniform volume** keeps premultiplied colour C = ∫ κ dA, over the opacity A gathered so far. With κ₀ the greatest
+//! colour (at least 1), from C − C̄ = Σ w (κ − κ̄)(dA − dĀ) + (κ̄ − κ) dĀ + κ (dĀ − dA), a cell is off by at most
 //!
 //! - q κ₀ min(l ḡ, g/ρ) as the extinction is off, and of that q κ₀ (l ō)²/4 e^{−lρ̂} more as the exponential is curved;
 //! - q g_κ min(1, l ρ) as the colour is off;
 //! - ½ q o_κ min(l ō, o/ρ, 1) as both vary together,
 //!
-//! where q = 1 + min(1, l ρ): what is off of the extinction is itself hidden, wrongly. And segments whose scalars stay where ρ and κ are
-//! within ρ₀ … ρ₁ and κ₀ … κ₁ differ by no more than κ₁ (1 − e^{−lρ₁}) − κ₀ (1 − e^{−lρ₀}): near the diagonal this tells a function of
-//! many knots, a peak or a step. Along the length, opacity is 1 − e^{−lρ̂}, whose chord over Δl is off by at most φ(ρ Δl),
-//! φ(x) = max_u (1 − e^{−xu}) − u (1 − e^{−x}), with the greatest ρ, and C by at most that times the greatest κ.
+//! where q = 1 + min(1, l ρ): what is off of the extinction is itself hidden, wrongly. And segments whose scalars stay
+//! where ρ and κ are within ρ₀ … ρ₁ and κ₀ … κ₁ differ by no more than κ₁ (1 − e^{−lρ₁}) − κ₀ (1 − e^{−lρ₀}): near the
+//! diagonal this tells a function of many knots, a peak or a step. Along the length, opacity is 1 − e^{−lρ̂}, whose
+//! chord over Δl is off by at most φ(ρ Δl), φ(x) = max_u (1 − e^{−xu}) − u (1 − e^{−x}), with the greatest ρ, and C by
+//! at most that times the greatest κ.
 //!
-//! **Normalised tables** keep ρ̂ and Ĉ = C/α. Of ρ̂ = (R(s_b) − R(s_f))/(s_b − s_f), R = ∫ρ, the numerator is a sum of functions of one
-//! value each, whose chords are off by ε ≤ ¼ of what ρ varies over the texel (⅛ where it is linear): what lies between the ends does
-//! not count. So E[ρ̂] is off by at most (ε_f + ε_b + r/√8)/d, d the least distance of the values in texels and r what ρ̂ varies over the
-//! cell: the last is the covariance of ρ̂ and d. From an error δ of ρ̂ ≥ ρ₀, opacity is off by at most e^{−lρ₀} − e^{−l(ρ₀+δ)}.
+//! **Normalised tables** keep ρ̂ and Ĉ = C/α. Of ρ̂ = (R(s_b) − R(s_f))/(s_b − s_f), R = ∫ρ, the numerator is a sum of
+//! functions of one value each, whose chords are off by ε ≤ ¼ of what ρ varies over the texel (⅛ where it is linear):
+//! what lies between the ends does not count. So E[ρ̂] is off by at most (ε_f + ε_b + r/√8)/d, d the least distance of
+//! the values in texels and r what ρ̂ varies over the cell: the last is the covariance of ρ̂ and d. From an error δ of
+//! ρ̂ ≥ ρ₀, opacity is off by at most e^{−lρ₀} − e^{−l(ρ₀+δ)}.
 //!
-//! Where one kink, of a change of slope σ per texel, is between two neighbouring intervals, E[ρ̂] is off by σ/16 at most.
+//! Where one kink, of a change of slope σ per texel, is between two neighbouring intervals, E[ρ̂] is off by σ/16 at
+//! most.
 //!
-//! Ĉ is a mean of κ, and so off by no more than κ varies over the cell. Its weights p = lρ e^{−D}/α are off by ∫|p − p̄| ≤ (q + 1) l ō/α
-//! one by one, and on average by that of the gap and (1.5 + (q + 1)/α)(l ō)²; the first counts times the shift of κ, the second times half
-//! of what κ varies by over the segment, as a constant is seen as it is. All of it counts times α. Or else Ĉ = ∫ κ ρ e^{−λR} ds / ∫ ρ e^{−λR} ds
-//! over the values, λ = l/(s_b − s_f), of which only the ends and λ move: an error of ⅛ of both second derivatives, which follow from
-//! ∂Ĉ/∂s_b = (κ_b − Ĉ) h, h = λρ_b/(e^X − 1), ∂Ĉ/∂s_f = (Ĉ − κ_f) h, h = λρ_f/(1 − e^{−X}), and λ ∂Ĉ/∂λ = X dĈ/dX (below). With r = ρ/(ρ̂ d) at
-//! an end and r′ = ρ′/(ρ̂ d), h ≤ r and |∂h/∂s_b| ≤ r′ + r² behind; h ≤ r (1 + X) and |∂h/∂s_f| ≤ r′ (1 + X) + r² in front.
+//! Ĉ is a mean of κ, and so off by no more than κ varies over the cell. Its weights p = lρ e^{−D}/α are off by ∫|p −
+//! p̄| ≤ (q + 1) l ō/α one by one, and on average by that of the gap and (1.5 + (q + 1)/α)(l ō)²; the first counts
+//! times the shift of κ, the second times half of what κ varies by over the segment, as a constant is seen as it is.
+//! All of it counts times α. Or else Ĉ = ∫ κ ρ e^{−λR} ds / ∫ ρ e^{−λR} ds over the values, λ = l/(s_b − s_f), of which
+//! only the ends and λ move: an error of ⅛ of both second derivatives, which follow from ∂Ĉ/∂s_b = (κ_b − Ĉ) h, h =
+//! λρ_b/(e^X − 1), ∂Ĉ/∂s_f = (Ĉ − κ_f) h, h = λρ_f/(1 − e^{−X}), and λ ∂Ĉ/∂λ = X dĈ/dX (below). With r = ρ/(ρ̂ d) at an
+//! end and r′ = ρ′/(ρ̂ d), h ≤ r and |∂h/∂s_b| ≤ r′ + r² behind; h ≤ r (1 + X) and |∂h/∂s_f| ≤ r′ (1 + X) + r² in
+//! front.
 //!
-//! Along the length, Ĉ depends on the depth X = lρ̂ alone: with z the share of the depth it is ∫ κ X e^{−Xz}/(1 − e^{−X}) dz, of which the
-//! factor's m-th derivative at X = 0 is, but for its sign, the Bernoulli polynomial B_m(z), and less beyond; so |dᵐĈ/dXᵐ| ≤ ½ ∫|B_m| of
-//! what κ varies by. *Polynomials* of degree n through equal distances are off by that for m = n + 1 times max|Π (X − X_k)|/(n + 1)!, and
-//! by no more than (1 + Λ)/2 of what κ varies by, Λ their Lebesgue constant; what is off of the values counts Λ times. *Logarithmic* lengths
-//! are linear over an octave: ⅛ of the second derivative by log₂ l, ln²2 (X² Ĉ″ + X Ĉ′), where X Ĉ′ ≤ 1/e and X² Ĉ″ ≤ 4/e² of what κ
-//! varies by.
+//! Along the length, Ĉ depends on the depth X = lρ̂ alone: with z the share of the depth it is ∫ κ X e^{−Xz}/(1 −
+//! e^{−X}) dz, of which the factor's m-th derivative at X = 0 is, but for its sign, the Bernoulli polynomial B_m(z),
+//! and less beyond; so |dᵐĈ/dXᵐ| ≤ ½ ∫|B_m| of what κ varies by. *Polynomials* of degree n through equal distances are
+//! off by that for m = n + 1 times max|Π (X − X_k)|/(n + 1)!, and by no more than (1 + Λ)/2 of what κ varies by, Λ
+//! their Lebesgue constant; what is off of the values counts Λ times. *Logarithmic* lengths are linear over an octave:
+//! ⅛ of the second derivative by log₂ l, ln²2 (X² Ĉ″ + X Ĉ′), where X Ĉ′ ≤ 1/e and X² Ĉ″ ≤ 4/e² of what κ varies by.
 
 use super::volume::{Kind, Table};
 use super::{Polynomial, is_scalar};
@@ -47,7 +53,8 @@ use crate::integral::{Exact, Knots};
 /// Errors of rounding texels to f32 and of what builds them, relative to the greatest colour.
 const ROUNDING: f64 = 2e-6;
 
-/// For degrees from 1: ½ ∫|B_{n+1}| max|Π (x − i/n)|/(n + 1)!, and the Lebesgue constant of n + 1 points at equal distances.
+/// For degrees from 1: ½ ∫|B_{n+1}| max|Π (x − i/n)|/(n + 1)!, and the Lebesgue constant of n + 1 points at equal
+/// distances.
 const DEGREES: [[f64; 2]; 8] = [
     [4.010e-3, 1.0],
     [1.253e-4, 1.25],
@@ -76,13 +83,14 @@ struct Interval {
     bend: f64,
     rise: f64,
     end: End,
-    /// The kink of extinction at the lower value, a quarter of its change of slope per texel; endless if it is a step. And gaps there.
+    /// The kink of extinction at the lower value, a quarter of its change of slope per texel; endless if it is a step.
+    /// And gaps there.
     kink: f64,
     between: [f64; 2],
 }
 
-/// What is known of the function where segments of a cell end: the greatest extinction, and slopes of extinction and colours per texel,
-/// endless if there is a step.
+/// What is known of the function where segments of a cell end: the greatest extinction, and slopes of extinction and
+/// colours per texel, endless if there is a step.
 #[derive(Debug, Clone, Copy, Default)]
 struct End {
     most: f64,
@@ -103,7 +111,8 @@ struct Cell {
     most: f64,
     /// From what to what extinction and colours go in all of it.
     hull: [[f64; 2]; 4],
-    /// Least and greatest mean extinction of a segment, by how much the texels differ in it, and by how much their mean is off.
+    /// Least and greatest mean extinction of a segment, by how much the texels differ in it, and by how much their mean
+    /// is off.
     density: [f64; 2],
     spread: f64,
     off: f64,
@@ -145,8 +154,8 @@ impl Cell {
         self.hull[1..].iter().fold(0.0, |m: f64, [lo, hi]| m.max(hi - lo))
     }
 
-    /// The error of premultiplied colour and opacity along the values, for lengths up to `longest` and colours up to `brightest`, unless
-    /// it is below `enough`.
+    /// The error of premultiplied colour and opacity along the values, for lengths up to `longest` and colours up to
+    /// `brightest`, unless it is below `enough`.
     fn published(&self, longest: f64, brightest: f64, enough: f64) -> f64 {
         let curve = (self.shift * self.shift / 4.0 * curved(self.least, longest)).min(1.0);
         let hidden = 1.0 + (longest * self.most).min(1.0);
@@ -156,7 +165,8 @@ impl Cell {
         if sum <= enough {
             return sum;
         }
-        // As of normalised tables; the filter's mean of αĈ is not that of α times that of Ĉ, and that of e^{−lρ̂} is curved.
+        // As of normalised tables; the filter's mean of αĈ is not that of α times that of Ĉ, and that of e^{−lρ̂} is
+        // curved.
         let depth = longest * self.density[1];
         let curve = (self.spread * self.spread / 8.0 * curved(self.density[0], longest)).min(1.0);
         let mixed = depth.min(1.0) * self.bent(depth) + self.moved(depth) / 4.0 * (longest * self.spread).min(1.0);
@@ -189,7 +199,8 @@ impl Cell {
         self.contrast() * if all < 1.0 { all } else { 1.0 }
     }
 
-    /// Between texels, by how much the mean of Ĉ is off of which the second derivatives by its ends are known, `depth` being the greatest.
+    /// Between texels, by how much the mean of Ĉ is off of which the second derivatives by its ends are known, `depth`
+    /// being the greatest.
     fn bent(&self, depth: f64) -> f64 {
         let (d, contrast, thin) = (self.apart, self.contrast(), depth.min(1.0));
         let e = std::f64::consts::E;
@@ -208,8 +219,9 @@ impl Cell {
         one_way(a, b).max(one_way(b, a))
     }
 
-    /// The error of colour and opacity from a mean extinction and a mean colour, which along the length is off by `lengths` (of a depth)
-    /// of what it varies by, and through whose points it goes with a Lebesgue constant of `times`.
+    /// The error of colour and opacity from a mean extinction and a mean colour, which along the length is off by
+    /// `lengths` (of a depth) of what it varies by, and through whose points it goes with a Lebesgue constant of
+    /// `times`.
     fn normalised(&self, longest: f64, lengths: impl Fn(f64) -> f64, times: f64) -> f64 {
         let ([least, densest], opacity) = (self.density, self.opacity(longest));
         let (depth, contrast) = (longest * densest, self.contrast());
@@ -233,8 +245,8 @@ impl Cell {
     }
 }
 
-/// The greatest of `error`, which is told the greatest so far, over the cells of a table of `values`², as far as one is beyond `limit`; and
-/// the greatest colour, at least 1.
+/// The greatest of `error`, which is told the greatest so far, over the cells of a table of `values`², as far as one is
+/// beyond `limit`; and the greatest colour, at least 1.
 fn worst(exact: &Exact<f64>, values: u32, limit: f64, mut error: impl FnMut(&Cell, f64) -> f64) -> Option<[f64; 2]> {
     if !is_scalar(exact) || exact.direct || values < 3 {
         return None;
@@ -312,8 +324,9 @@ fn worst(exact: &Exact<f64>, values: u32, limit: f64, mut error: impl FnMut(&Cel
     Some([greatest, brightest])
 }
 
-/// A bound on the error of a uniform table of `values`² × `slices` texels for segments of up to `longest` normalised units, looked up
-/// anywhere. `None` for fields of several components, for direct emission, which has no greatest colour, and for less than 3 values.
+/// A bound on the error of a uniform table of `values`² × `slices` texels for segments of up to `longest` normalised
+/// units, looked up anywhere. `None` for fields of several components, for direct emission, which has no greatest
+/// colour, and for less than 3 values.
 pub fn bound(exact: &Exact<f64>, values: u32, slices: u32, longest: f64) -> Option<f64> {
     let [of_values, brightest] = along_values(exact, values, longest, f64::INFINITY)?;
     Some((of_values + along_lengths(exact, slices, longest, brightest) + ROUNDING * brightest).min(brightest))
@@ -349,8 +362,8 @@ fn of_normalised(exact: &Exact<f64>, values: u32, slices: u32, longest: f64, lim
     Some((error + ROUNDING * brightest).min(brightest))
 }
 
-/// The smallest powers of 2, of at most 256 values and 128 lengths, whose bounds are half of `error` each; the greatest where none is.
-/// `None` as [`bound`].
+/// The smallest powers of 2, of at most 256 values and 128 lengths, whose bounds are half of `error` each; the greatest
+/// where none is. `None` as [`bound`].
 pub fn size(exact: &Exact<f64>, longest: f64, error: f64) -> Option<[u32; 3]> {
     let [mut n, mut slices] = [16, 8];
     let mut of_values = along_values(exact, n, longest, error)?;
@@ -364,7 +377,8 @@ pub fn size(exact: &Exact<f64>, longest: f64, error: f64) -> Option<[u32; 3]> {
     Some([n, n, slices])
 }
 
-/// The fewest of the powers of 2 from 64 to `most` values whose bound is `error` for polynomials of `degree`; `None` if none is.
+/// The fewest of the powers of 2 from 64 to `most` values whose bound is `error` for polynomials of `degree`; `None` if
+/// none is.
 pub fn values_of_polynomial(exact: &Exact<f64>, degree: u32, longest: f64, error: f64, most: u32) -> Option<u32> {
     fewest(most, error, |n| of_polynomial(exact, degree, n, longest, error))
 }
@@ -514,5 +528,37 @@ impl Polynomial {
     /// [`bound_of_polynomial`] of a table of this size.
     pub fn bound(&self, exact: &Exact<f64>) -> Option<f64> {
         bound_of_polynomial(exact, self.degree, self.size, self.longest)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Bernoulli's polynomials by B_m′ = m B_{m−1} and ∫ B_m = 0; Lagrange's by their definition.
+    #[test]
+    fn constants_of_degrees_are_what_they_say() {
+        let at = |powers: &[f64], x: f64| powers.iter().rev().fold(0.0, |v, p| v * x + p);
+        let places = || (0..=20_000).map(|i| f64::from(i) / 20_000.0);
+        let mut bernoulli = vec![1.0];
+        for (n, [slope, lebesgue]) in (1..).zip(DEGREES) {
+            let m = n + 1;
+            while bernoulli.len() < m + 1 {
+                let k = bernoulli.len() as f64;
+                let mut next: Vec<f64> = (0..).zip(&bernoulli).map(|(i, c)| k * c / f64::from(i + 1)).collect();
+                next.insert(0, -(0..).zip(&next).map(|(i, c)| c / f64::from(i + 2)).sum::<f64>());
+                bernoulli = next;
+            }
+            let mean = places().map(|x| at(&bernoulli, x).abs()).sum::<f64>() / 20_001.0;
+            let nodes: Vec<f64> = (0..=n).map(|i| i as f64 / n as f64).collect();
+            let product = places().fold(0.0, |m: f64, x| m.max(nodes.iter().map(|k| (x - k).abs()).product()));
+            let factorial: f64 = (1..=m).map(|k| k as f64).product();
+            assert!((slope / (mean / 2.0 * product / factorial) - 1.0).abs() < 2e-3, "{n}: {slope}");
+            let lagrange = |x: f64, i: usize| -> f64 {
+                (0..=n).filter(|&k| k != i).map(|k| ((x - nodes[k]) / (nodes[i] - nodes[k])).abs()).product()
+            };
+            let most = places().fold(0.0, |m: f64, x| m.max((0..=n).map(|i| lagrange(x, i)).sum()));
+            assert!(lebesgue >= most && lebesgue < 1.001 * most, "{n}: {lebesgue}, not {most}");
+        }
     }
 }

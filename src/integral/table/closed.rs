@@ -1,12 +1,14 @@
 //! Tables in closed form, at a cost per texel that does not depend on the number of knots.
 //!
-//! Texels whose values are d apart have d intervals of the function between them, each l/d long: what an interval does then depends
-//! on l/d alone, and not on the texel. So for each length and distance, the intervals are integrated once, in closed form, and the
-//! texels are all runs of d neighbours of them. Compositing is associative, and runs of one length over anything associative take
-//! three steps each (van Herk 1992; Gil & Werman 1993): the intervals are cut into blocks of d; a run is the end of one block and the
-//! beginning of the next. Nothing is divided or subtracted, so nothing is lost: errors are those of f32.
+//! Texels whose values are d apart have d intervals of the function between them, each l/d long: what an interval does
+//! then depends on l/d alone, and not on the texel. So for each length and distance, the intervals are integrated once,
+//! in closed form, and the texels are all runs of d neighbours of them. Compositing is associative, and runs of one
+//! length over anything associative take three steps each (van Herk 1992; Gil & Werman 1993): the intervals are cut
+//! into blocks of d; a run is the end of one block and the beginning of the next. Nothing is divided or subtracted, so
+//! nothing is lost: errors are those of f32.
 //!
-//! A falling scalar passes the intervals of a rising one in reverse: both are integrated at once, as they share most of it.
+//! A falling scalar passes the intervals of a rising one in reverse: both are integrated at once, as they share most of
+//! it.
 
 use super::grid::{Grid, Part};
 use crate::integral::{GAUSS_3, GAUSS_6, PANEL, Piece, SHALLOW};
@@ -71,8 +73,8 @@ pub(super) struct Scratch<const L: usize> {
 /// Parts times lengths that are integrated at a time: a multiple of all numbers of lengths.
 const AT_ONCE: usize = 128;
 
-/// For each part and length: optical depths at its ends, its opacity, and the weights of the emission at its ends, seen by a rising
-/// scalar and by a falling one.
+/// For each part and length: optical depths at its ends, its opacity, and the weights of the emission at its ends, seen
+/// by a rising scalar and by a falling one.
 struct Weights {
     x: [f32; AT_ONCE],
     y: [f32; AT_ONCE],
@@ -96,8 +98,8 @@ impl Weights {
         falling: [[0.0; AT_ONCE]; 2],
     };
 
-    /// As [`Piece::new`], both ways, for depths that `rule` is for. Takes no decisions and a node at a time, so that it becomes vector
-    /// instructions.
+    /// As [`Piece::new`], both ways, for depths that `rule` is for. Takes no decisions and a node at a time, so that it
+    /// becomes vector instructions.
     #[inline(always)]
     fn integrate<const N: usize, const SHALLOW: bool, const DIRECT: bool>(&mut self, rule: &[[f64; 2]; N]) {
         let Weights { x, y, alpha, rising: [rising_front, rising_back], falling: [falling_front, falling_back] } = self;
@@ -122,9 +124,9 @@ impl Weights {
         }
     }
 
-    /// The same for depths up to [`SHALLOW`], of chromatic emission, by the series of β in the mean depth D and the rise δ = y − x. With
-    /// T(u) = D u − ½ δ (u − u²) it is β = Ψ − e^{−D}, and the term of δᵏ Dᵐ in Ψ is (−1)ᵐ (m + k)! / (2ᵏ m! (m + 2k + 1)!).
-    /// Falling, δ has the other sign.
+    /// The same for depths up to [`SHALLOW`], of chromatic emission, by the series of β in the mean depth D and the
+    /// rise δ = y − x. With T(u) = D u − ½ δ (u − u²) it is β = Ψ − e^{−D}, and the term of δᵏ Dᵐ in Ψ is (−1)ᵐ (m +
+    /// k)! / (2ᵏ m! (m + 2k + 1)!). Falling, δ has the other sign.
     #[inline(always)]
     fn expand(&mut self) {
         for q in 0..AT_ONCE {
@@ -198,8 +200,8 @@ impl<'a, const L: usize> Runs<'a, L> {
         Scratch { intervals: empty.clone(), ends: empty }
     }
 
-    /// Segments between values that are `d` texels apart, by the lower of the two; of those with d = 0, that which rises is what
-    /// counts. As many as there are: the table's size less d.
+    /// Segments between values that are `d` texels apart, by the lower of the two; of those with d = 0, that which
+    /// rises is what counts. As many as there are: the table's size less d.
     pub(super) fn apart(&self, d: usize, scratch: &mut Scratch<L>, segments: &mut [Both<L>]) {
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") {
@@ -296,8 +298,8 @@ pub(super) fn opacity(depth: f32) -> f32 {
 /// Opacities below this have no colour over them but the limit.
 const THIN: f32 = 1e-30;
 
-/// What stands for colour and opacity, between the values `i` and `j`: colour over opacity (direct: over the length that is seen),
-/// and the mean extinction, at most `most`; and the same at the limit where nothing hides anything.
+/// What stands for colour and opacity, between the values `i` and `j`: colour over opacity (direct: over the length
+/// that is seen), and the mean extinction, at most `most`; and the same at the limit where nothing hides anything.
 #[inline(always)]
 pub(super) fn normalise<const L: usize>(grid: &Grid, [i, j]: [usize; 2], both: &mut Both<L>, most: f32) -> [f32; 4] {
     let [r, g, b, density] = grid.limit(i, j);

@@ -40,8 +40,8 @@ pub(super) struct Grid {
     pub(super) plain: bool,
     /// Extinction and colour of a segment that has this value all along.
     pub(super) constant: Vec<[f32; 4]>,
-    /// Integrals up to each value, an interval being 1 wide, of colour times extinction (direct: of emission), and of extinction; and
-    /// what these sums lack.
+    /// Integrals up to each value, an interval being 1 wide, of colour times extinction (direct: of emission), and of
+    /// extinction; and what these sums lack.
     sums: Vec<[f64; 4]>,
     rests: Vec<[f64; 4]>,
     /// The colour at each value.
@@ -92,8 +92,8 @@ impl Grid {
         }
     }
 
-    /// What colour over opacity (direct: over the length that is seen) becomes between two values where nothing hides anything, and the
-    /// mean extinction ρ̂. Which of the values is in front does not matter.
+    /// What colour over opacity (direct: over the length that is seen) becomes between two values where nothing hides
+    /// anything, and the mean extinction ρ̂. Which of the values is in front does not matter.
     #[inline(always)]
     pub(super) fn limit(&self, i: usize, j: usize) -> [f32; 4] {
         if i == j {

@@ -1,8 +1,9 @@
 //! The separated table (Guthe, Röttger, Schieber, Straßer & Ertl 2002, section 3).
 //!
-//! Opacity needs two parameters only: with the mean extinction ρ̂(s_f, s_b) = ∫₀¹ ρ(s_f + t (s_b − s_f)) dt it is
-//! α = 1 − e^{−l ρ̂}. The colour over α hardly depends on the length: it is a polynomial of degree n in l/l_max, through its
-//! values at l = (i/n) l_max, the first of which is its limit. So n + 1 tables of two parameters stand for one of three.
+//! Opacity needs two parameters only: with the mean extinction ρ̂(s_f, s_b) = ∫₀¹ ρ(s_f + t (s_b − s_f)) dt it is α = 1
+//! − e^{−l ρ̂}. The colour over α hardly depends on the length: it is a polynomial of degree n in l/l_max, through its
+//! values at l = (i/n) l_max, the first of which is its limit. So n + 1 tables of two parameters stand for one of
+//! three.
 
 use super::closed::{self, Both, Runs};
 use super::grid::Grid;
@@ -56,9 +57,9 @@ fn coefficients<const L: usize, const P: usize>(
 pub(crate) type Inverse = Vec<Vec<f64>>;
 
 impl Polynomial {
-    /// Integrates `exact` over segments of up to `longest` normalised units, on the current rayon pool. `None` for fields of
-    /// several components, less than 2 texels along an axis, and degrees that are not 1 to 8: points at equal distances give no
-    /// better ones.
+    /// Integrates `exact` over segments of up to `longest` normalised units, on the current rayon pool. `None` for
+    /// fields of several components, less than 2 texels along an axis, and degrees that are not 1 to 8: points at equal
+    /// distances give no better ones.
     pub fn new(exact: &Exact<f64>, degree: u32, size: u32, longest: f64) -> Option<Self> {
         if !is_scalar(exact) || size < 2 || !(1..=8).contains(&degree) {
             return None;
@@ -85,7 +86,8 @@ impl Polynomial {
         Some(Polynomial { degree, size, longest, direct: exact.direct, texels })
     }
 
-    /// The same table, to f32, in a time per texel that does not depend on the function (`closed.rs` says how), up to degree 4.
+    /// The same table, to f32, in a time per texel that does not depend on the function (`closed.rs` says how), up to
+    /// degree 4.
     pub fn closed(exact: &Exact<f64>, degree: u32, size: u32, longest: f64) -> Option<Self> {
         // Of higher degrees, coefficients are great sums of both signs, which f32 does not hold.
         if size < 3 || degree > 4 {
@@ -100,7 +102,8 @@ impl Polynomial {
         Some(table)
     }
 
-    /// This table of another function, in the memory that it has: faster than [`Polynomial::closed`], as that is then known to be there.
+    /// This table of another function, in the memory that it has: faster than [`Polynomial::closed`], as that is then
+    /// known to be there.
     pub fn rebuild(&mut self, exact: &Exact<f64>) {
         if is_scalar(exact) && self.size > 2 && self.degree <= 4 {
             self.direct = exact.direct;
@@ -133,8 +136,8 @@ impl Polynomial {
         for of in &mut self.texels {
             of.chunks_exact_mut(n).zip(&mut by_row).for_each(|(row, rows)| rows.push(row));
         }
-        // Coefficients of a rising scalar and of a falling one: of some distances at a time, so that they stay in the cache, each
-        // written by one thread and read by another.
+        // Coefficients of a rising scalar and of a falling one: of some distances at a time, so that they stay in the
+        // cache, each written by one thread and read by another.
         let runs = Runs::new(grid, lengths);
         let band = (BAND / n).clamp(1, n);
         // Not as many as a power of 2, as then all distances of a texel would have one place in the cache.
@@ -180,8 +183,9 @@ impl Polynomial {
         reconstructed(color, sums[0][3], l, self.direct)
     }
 
-    /// The greatest of each coefficient's channels, by which it is divided where texels are in [−1, 1]: one scale for the colours of
-    /// all powers would leave the higher ones few levels, so each has its own; with it, that of the mean extinction (which is in [0, 1]).
+    /// The greatest of each coefficient's channels, by which it is divided where texels are in [−1, 1]: one scale for
+    /// the colours of all powers would leave the higher ones few levels, so each has its own; with it, that of the mean
+    /// extinction (which is in [0, 1]).
     pub fn scales(&self) -> Vec<[f32; 2]> {
         let most = |t: &Vec<[f32; 4]>| {
             t.iter()
@@ -190,7 +194,8 @@ impl Polynomial {
         self.texels.iter().map(most).collect()
     }
 
-    /// The same table as texels of `bits` bits hold it, scaled to their range: two's complement for coefficients, as they have a sign.
+    /// The same table as texels of `bits` bits hold it, scaled to their range: two's complement for coefficients, as
+    /// they have a sign.
     pub fn rounded(&self, bits: u32) -> Self {
         let levels = (2f32).powi(bits as i32) - 1.0;
         let half = ((2f32).powi(bits as i32 - 1) - 1.0).max(1.0);
