@@ -126,7 +126,7 @@ pub enum Build {
     Auto,
     /// On the processor, from where they are handed over.
     Host,
-    /// On the device, be it software.
+    /// On the device, be it software: frames then wait behind that.
     Device,
 }
 

@@ -373,7 +373,7 @@ fn errors_are_within_their_bounds() {
             ] {
                 // Half of them within two texels of the diagonal, where functions are seen as they are.
                 let near = |i: usize, f: f64, b: f64| {
-                    if i % 2 == 0 { b } else { (f + 4.0 * b / f64::from(n)).clamp(-1.0, 1.0) }
+                    if i.is_multiple_of(2) { b } else { (f + 4.0 * b / f64::from(n)).clamp(-1.0, 1.0) }
                 };
                 let judged = |(i, [f, b, l]): (usize, [f64; 3])| {
                     let (b, l) = (near(i, f, b), longest * l);
