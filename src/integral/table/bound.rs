@@ -169,9 +169,8 @@ impl Cell {
         // curved.
         let depth = longest * self.density[1];
         let curve = (self.spread * self.spread / 8.0 * curved(self.density[0], longest)).min(1.0);
-        let mixed = depth.min(1.0) * self.bent(depth) + self.moved(depth) / 4.0 * (longest * self.spread).min(1.0);
-        let by_ends = mixed + brightest * (self.opacity(longest) + curve);
-        [self.hulls(longest), by_ends].iter().fold(sum, |m, &v| if v < m { v } else { m })
+        let mixed = self.of_values(longest) + self.moved(depth) / 4.0 * (longest * self.spread).min(1.0);
+        sum.min(self.hulls(longest)).min(mixed + brightest * (self.opacity(longest) + curve))
     }
 
     /// By how much segments of the hull differ, of lengths up to `longest`.
@@ -219,22 +218,27 @@ impl Cell {
         one_way(a, b).max(one_way(b, a))
     }
 
-    /// The error of colour and opacity from a mean extinction and a mean colour, which along the length is off by
-    /// `lengths` (of a depth) of what it varies by, and through whose points it goes with a Lebesgue constant of
-    /// `times`.
-    fn normalised(&self, longest: f64, lengths: impl Fn(f64) -> f64, times: f64) -> f64 {
-        let ([least, densest], opacity) = (self.density, self.opacity(longest));
-        let (depth, contrast) = (longest * densest, self.contrast());
-        let alpha = depth.min(1.0);
-        let hidden = 2.0 + depth.min(1.0);
+    /// By how much the mean of Ĉ is off between texels, times the opacity that it counts with.
+    fn of_values(&self, longest: f64) -> f64 {
+        let ([least, densest], contrast) = (self.density, self.contrast());
+        let alpha = (longest * densest).min(1.0);
+        let hidden = 2.0 + alpha;
         let seen = -(-longest * least).exp_m1();
         let (gap, shift) = ((longest * self.gap).min(self.over), (longest * self.shift).min(self.shift_over));
         let weights = hidden * gap + (1.5 + hidden / seen) * shift * shift;
         let by_weights = alpha * self.gap_colour
             + (1.0 + self.off / least) * (self.shift_colour * hidden * shift + contrast / 2.0 * weights);
+        let by_ends = alpha * self.bent(longest * densest);
         // Without extinction there is neither.
-        let of_values =
-            [by_weights, alpha * self.bent(depth)].iter().fold(alpha * contrast, |m, &v| if v < m { v } else { m });
+        [by_weights, by_ends].iter().fold(alpha * contrast, |m, &v| if v < m { v } else { m })
+    }
+
+    /// The error of colour and opacity from a mean extinction and a mean colour, which along the length is off by
+    /// `lengths` (of a depth) of what it varies by, and through whose points it goes with a Lebesgue constant of
+    /// `times`.
+    fn normalised(&self, longest: f64, lengths: impl Fn(f64) -> f64, times: f64) -> f64 {
+        let (depth, contrast, opacity) = (longest * self.density[1], self.contrast(), self.opacity(longest));
+        let (alpha, of_values) = (depth.min(1.0), self.of_values(longest));
         let of_points = (times * of_values).min(of_values + times * alpha * contrast * depth / 4.0);
         let most = ((1.0 + times) / 2.0).min(1.0 + (1.0 + times) * depth / 8.0);
         let colour = (of_points + alpha * contrast * lengths(depth)).min(alpha * contrast * most);
