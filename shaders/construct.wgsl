@@ -35,7 +35,8 @@ struct Job {
     degree: u32,
     /// Slices that are filled side by side.
     count: u32,
-    unused: u32,
+    /// Texels from one row to the next.
+    pitch: u32,
     lengths: array<vec4f, 64>,
     /// Row by row, what makes coefficients of points: of a limit, and of up to four more.
     weights: array<vec4f, 10>,
@@ -54,6 +55,11 @@ const NOTHING = vec4f(0.0, 0.0, 0.0, 1.0);
 
 fn most_work() -> u32 {
     return 0xffffffu;
+}
+
+/// Where texel (i, j) of a slice, a plane or a power is.
+fn index(slice: u32, i: u32, j: u32) -> u32 {
+    return (slice * job.size + j) * job.pitch + i;
 }
 
 fn length_of(slice: u32) -> f32 {
@@ -147,7 +153,7 @@ fn runs(slice: u32, d: u32, rising: bool) {
                 if i == block {
                     texel = finished(front, back, end, l);
                 }
-                texels[(slice * n + back) * n + front] = texel;
+                texels[index(slice, front, back)] = texel;
             }
         }
         var beginning = NOTHING;
@@ -156,7 +162,7 @@ fn runs(slice: u32, d: u32, rising: bool) {
             beginning = over(beginning, interval(i + d - 1u, rising, step));
             let front = select(n - 1u - i, i, rising);
             let back = select(front - d, front + d, rising);
-            let at = (slice * n + back) * n + front;
+            let at = index(slice, front, back);
             texels[at] = finished(front, back, over(texels[at], beginning), l);
         }
     }
@@ -175,7 +181,7 @@ fn closed(@builtin(global_invocation_id) id: vec3u) {
         let l = length_of(slice);
         for (var i = 0u; i < n; i++) {
             let value = nodes[i].constant;
-            texels[(slice * n + i) * n + i] = finished(i, i, light_of(value, value, l), l);
+            texels[index(slice, i, i)] = finished(i, i, light_of(value, value, l), l);
         }
         return;
     }
@@ -186,22 +192,20 @@ fn closed(@builtin(global_invocation_id) id: vec3u) {
 /// Coefficients of the polynomials through the slices.
 @compute @workgroup_size(64)
 fn coefficients(@builtin(global_invocation_id) id: vec3u) {
-    let n = job.size;
     let i = id.x;
     let j = id.y;
-    if i >= n {
+    if i >= job.size {
         return;
     }
-    let at = j * n + i;
     let first = limit(i, j);
     for (var c = 0u; c <= job.degree; c++) {
         let low = job.weights[2u * c];
         var sum = first * low.x;
         for (var k = 1u; k <= job.degree; k++) {
             let weight = job.weights[2u * c + k / 4u][k % 4u];
-            sum += texels[((k - 1u) * n + j) * n + i].xyz * weight;
+            sum += texels[index(k - 1u, i, j)].xyz * weight;
         }
-        result[c * n * n + at] = vec4f(sum, select(0.0, texels[at].w, c == 0u));
+        result[index(c, i, j)] = vec4f(sum, select(0.0, texels[index(0u, i, j)].w, c == 0u));
     }
 }
 
@@ -237,7 +241,7 @@ fn sampled(@builtin(global_invocation_id) id: vec3u) {
         }
         sum = over(sum, vec4f(entry.xyz * seen, 1.0 - alpha));
     }
-    texels[(slice * n + j) * n + i] = vec4f(sum.xyz, 1.0 - sum.w);
+    texels[index(slice, i, j)] = vec4f(sum.xyz, 1.0 - sum.w);
 }
 
 /// What is in front of `behind`, both with opacities.
@@ -246,42 +250,34 @@ fn before(front: vec4f, behind: vec4f) -> vec4f {
 }
 
 fn texel(slice: u32, i: u32, j: u32) -> vec4f {
-    return texels[(slice * job.size + j) * job.size + i];
+    return texels[index(slice, i, j)];
+}
+
+/// A texel of slice `first`: a segment of slice `slab` before one of the slice before, which meet between two values.
+fn join(i: u32, j: u32, slab: u32, low: u32, high: u32, share: f32) {
+    let previous = job.first - 1u;
+    let front = mix(texel(slab, i, low), texel(slab, i, high), share);
+    let rest = mix(texel(previous, low, j), texel(previous, high, j), share);
+    texels[index(job.first, i, j)] = before(front, rest);
 }
 
 /// Slice `first` of twice the length of the one before.
 @compute @workgroup_size(64)
 fn doubled(@builtin(global_invocation_id) id: vec3u) {
-    let n = job.size;
-    let i = id.x;
-    let j = id.y;
-    if i >= n {
-        return;
+    let sum = id.x + id.y;
+    if id.x < job.size {
+        join(id.x, id.y, job.first - 1u, sum / 2u, (sum + 1u) / 2u, 0.5);
     }
-    let previous = job.first - 1u;
-    let low = (i + j) / 2u;
-    let high = (i + j + 1u) / 2u;
-    let front = (texel(previous, i, low) + texel(previous, i, high)) * 0.5;
-    let back = (texel(previous, low, j) + texel(previous, high, j)) * 0.5;
-    texels[(job.first * n + j) * n + i] = before(front, back);
 }
 
 /// Slice `first`, which is a slab longer than the one before.
 @compute @workgroup_size(64)
 fn longer(@builtin(global_invocation_id) id: vec3u) {
-    let n = job.size;
-    let i = id.x;
-    let j = id.y;
-    if i >= n {
-        return;
+    let middle = f32(id.x) + (f32(id.y) - f32(id.x)) / f32(job.first);
+    let low = min(u32(middle), job.size - 2u);
+    if id.x < job.size {
+        join(id.x, id.y, 1u, low, low + 1u, middle - f32(low));
     }
-    let previous = job.first - 1u;
-    let middle = f32(i) + (f32(j) - f32(i)) / f32(job.first);
-    let low = min(u32(middle), n - 2u);
-    let share = middle - f32(low);
-    let slab = mix(texel(1u, i, low), texel(1u, i, low + 1u), share);
-    let rest = mix(texel(previous, low, j), texel(previous, low + 1u, j), share);
-    texels[(job.first * n + j) * n + i] = before(slab, rest);
 }
 
 /// Equation 9 of Röttger & Ertl (2002): the scalar in front and the length, both in [0, 1].
@@ -320,6 +316,6 @@ fn cylinder(@builtin(global_invocation_id) id: vec3u) {
         sum = over(light, sum);
         front = value;
         length = next.y;
-        texels[(plane * n + id.x) * n + i] = vec4f(sum.xyz, 1.0 - sum.w);
+        texels[index(plane, i, id.x)] = vec4f(sum.xyz, 1.0 - sum.w);
     }
 }

@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 use crate::field::{Field, Kind, Normal};
 use crate::geometry::{Geometry, Values};
 use crate::gpu::Part;
+use crate::gpu::table::builds;
 use crate::gpu::{DeviceChoice, Gpu};
 use crate::image::Image;
 use crate::integral::{Choice, Exact, Form, Integral, Lookup, lookup};
@@ -57,6 +58,8 @@ pub struct Renderer {
     key: Option<Option<Arc<Key>>>,
     /// Whether the next frame waits for its table.
     waits: bool,
+    /// The device failed to build a table: others are built on the host.
+    host_builds: bool,
     stats: Stats,
 }
 
@@ -127,7 +130,7 @@ pub struct Stats {
     pub frame_ms: f64,
     /// The form of the ray integral that it was drawn with.
     pub integral: String,
-    /// Building its table, in ms, and what that takes, in bytes; 0 without one.
+    /// Building its table, in ms (on a device: 0 unless the frame waited for that), and what that takes, in bytes; 0 without one.
     pub table_ms: f64,
     /// See [`Self::table_ms`].
     pub table_bytes: u64,
@@ -216,6 +219,7 @@ impl Renderer {
             tables: Tables::default(),
             key: None,
             waits: true,
+            host_builds: false,
             stats,
         };
         renderer.name_device();
@@ -232,7 +236,13 @@ impl Renderer {
         self.project.as_mut()
     }
 
+    fn gpu(&self) -> Option<&Gpu> {
+        self.project.as_ref().map(Project::gpu).or(self.device.as_ref().map(Traverse::gpu))
+    }
+
     fn name_device(&mut self) {
+        // Whether tables are built on the device depends on it.
+        self.key = None;
         let gpu = self.project.as_ref().map(Project::gpu).or(self.device.as_ref().map(Traverse::gpu));
         (self.stats.device, self.stats.adapter) = match gpu {
             Some(gpu) => ("gpu".into(), gpu.adapter.name.clone()),
@@ -263,7 +273,7 @@ impl Renderer {
     pub fn set_integral(&mut self, integral: Choice) {
         if self.integral != integral {
             self.integral = integral;
-            (self.key, self.waits) = (None, integral.form != Form::Auto);
+            (self.key, self.waits, self.host_builds) = (None, integral.form != Form::Auto, false);
         }
     }
 
@@ -389,6 +399,7 @@ impl Renderer {
             Err(Error::Lost(why)) if self.project.is_some() => {
                 tracing::warn!("{why}; opening it again");
                 self.project = Some(Project::open(&self.choice)?);
+                self.key = None;
                 return self.try_render(view, progress);
             }
             Err(Error::Lost(why)) => {
@@ -421,6 +432,7 @@ impl Renderer {
     fn try_render(&mut self, view: &View, progress: &Progress) -> Result<Image> {
         let start = Instant::now();
         let missing = |what: &str| Error::Render(format!("there is no {what} to draw"));
+        let on_device = !self.host_builds && self.gpu().is_some_and(|gpu| builds(gpu, &self.integral));
         let mesh = self.mesh.as_mut().ok_or_else(|| missing("mesh"))?;
         let field = self.field.as_ref().ok_or_else(|| missing("field"))?;
         let transfer = self.transfer.as_ref().ok_or_else(|| missing("transfer function"))?;
@@ -447,7 +459,7 @@ impl Renderer {
                     let (pool, geometry) = (&self.pool, &mesh.geometry);
                     let longest = *mesh.longest.get_or_insert_with(|| pool.install(|| geometry.longest_edge()));
                     let exact = Exact::new(transfer, kind, &field.normal, geometry.scale);
-                    Arc::new(Key { exact, choice, longest })
+                    Arc::new(Key { exact, choice, longest, on_device })
                 });
                 self.key.insert(key)
             }
@@ -457,6 +469,19 @@ impl Renderer {
             Some(key) => self.tables.get(key, self.waits, &self.pool)?,
             None => None,
         };
+        if let (Some(key), Some(built)) = (key, built.as_ref().filter(|b| b.table.source().is_some())) {
+            let asked = Instant::now();
+            match hold(&mut self.project, &mut self.device, exact, &built.table, self.waits) {
+                Err(e @ Error::Lost(_)) => return Err(e),
+                Err(e) => {
+                    tracing::warn!("{e}; building the table on the CPU");
+                    (self.host_builds, self.key) = (true, None);
+                    return self.try_render(view, progress);
+                }
+                Ok(()) if self.waits => self.tables.took(key, ms(asked)),
+                Ok(()) => {}
+            }
+        }
         let late = key.as_ref().filter(|_| view.blend() == Blend::Composite && built.is_none()).cloned();
         let (mesh, table) = (&*mesh, built.as_ref().map(|b| &b.table));
         self.waits = false;
@@ -479,9 +504,7 @@ impl Renderer {
                 Some(ProjectionStats { drawn_cells: records, order_ms, project_ms, draw_ms, fragments });
             self.stats.device_ms = project_ms.zip(draw_ms).map(|(p, d)| p + d);
             self.stats.frame_ms = ms(start);
-            if let Some(key) = late {
-                self.tables.start(&key, &self.pool)?;
-            }
+            self.build_next(late)?;
             return Ok(Image { size: view.size(), pixels });
         }
         let frame = Frame { mesh, field, transfer, exact, table, view, progress };
@@ -501,16 +524,47 @@ impl Renderer {
         self.stats.repaired_rays = counts.repaired;
         self.stats.cpu_rays = counts.unfinished;
         self.stats.frame_ms = ms(start);
-        if let Some(key) = late {
-            self.tables.start(&key, &self.pool)?;
-        }
+        self.build_next(late)?;
         Ok(image)
+    }
+
+    /// Has the table built that a frame was drawn without.
+    fn build_next(&mut self, late: Option<Arc<Key>>) -> Result<()> {
+        let Some(key) = late else { return Ok(()) };
+        self.tables.start(&key, &self.pool)?;
+        if let (true, Some(built), Some(exact)) = (key.on_device, self.tables.ready(&key), &self.exact) {
+            // What fails now fails again in the next frame, which says so.
+            let _ = hold(&mut self.project, &mut self.device, exact, &built.table, false);
+        }
+        Ok(())
     }
 
     /// What the last calls did.
     pub fn stats(&self) -> &Stats {
         &self.stats
     }
+}
+
+/// Has the device that draws hold `table`, or build it; `wait`s until that is done.
+fn hold(
+    project: &mut Option<Project>,
+    traverse: &mut Option<Traverse>,
+    exact: &Exact<f32>,
+    table: &Arc<Lookup>,
+    wait: bool,
+) -> Result<()> {
+    let gpu = match (project, traverse) {
+        (Some(project), _) => {
+            project.prepare_table(exact, Some(table))?;
+            project.gpu()
+        }
+        (None, Some(traverse)) => {
+            traverse.prepare_table(exact, Some(table))?;
+            traverse.gpu()
+        }
+        (None, None) => return Err(Error::Device("there is no device to build a table".into())),
+    };
+    if wait { gpu.wait() } else { Ok(()) }
 }
 
 impl Loaded {
@@ -537,7 +591,9 @@ impl Frame<'_> {
         device: &mut Option<Traverse>,
     ) -> Result<(Image, cpu::Counts, Option<f64>)> {
         let geometry = &self.mesh.geometry;
-        let integral = Integral { exact: self.exact, table: self.table.map(|t| &**t) };
+        // Rays that a device leaves to the CPU are exact where that alone has the table.
+        let table = self.table.map(|t| &**t).filter(|t| t.source().is_none());
+        let integral = Integral { exact: self.exact, table };
         let pixel = |v: &[f32; N]| self.largest(v);
         let Some(traverse) = device else {
             let (image, counts) = cpu::render(geometry, values, integral, &pixel, self.view, self.progress);

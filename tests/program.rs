@@ -362,6 +362,9 @@ fn integrals_are_chosen() {
     let named = SCENE.replace("\"size\"", "\"integral\": \"auto\", \"size\"");
     assert_eq!(form(&named, ""), ("exact".into(), 0));
     assert_eq!(form(&named, "--integral exact"), ("exact".into(), 0));
+    let own = r#""integral": {"form": "polynomial", "table": [32, 32, 0], "build": "host"}, "size""#;
+    assert_eq!(form(&SCENE.replace("\"size\"", own), "--build device"), ("polynomial".into(), 16 * 32 * 32 * 3));
+    place.misused("render cube.vtu --out a.png --build there", "there");
 }
 
 #[test]
@@ -388,6 +391,14 @@ fn tables_are_compared() {
         assert!(rms("volume, log-normalised", construction) < 0.02, "{tables}");
         assert!(rms("polynomial, degree 2", construction) < 0.02, "{tables}");
     }
+    // What has a bound keeps it.
+    let number = |row: &serde_json::Value, key: &str| row[key].as_f64();
+    let bounded: Vec<_> = tables["tables"].as_array().unwrap().iter().filter(|t| !t["bound"].is_null()).collect();
+    assert!(bounded.iter().any(|t| t["form"] == "polynomial, degree 4") && bounded.len() > 9, "{tables}");
+    assert!(
+        bounded.iter().filter(|t| t["construction"] == "closed").all(|t| number(t, "max") <= number(t, "bound")),
+        "{tables}"
+    );
     assert!(rms("polynomial, degree 2", "closed, 16 bits") < rms("linear opacity", "closed"), "{tables}");
     assert!(rms("volume, uniform", "incremental") < 0.05 && rms("volume, log", "sliced") < 0.1, "{tables}");
     for picture in ["sheet.png", "tiles.png"] {

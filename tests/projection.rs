@@ -13,7 +13,7 @@
 mod common;
 
 use common::draw::{self, FIELDS, LOOKS, MESHES, Random, VIEWS};
-use common::{Engine, Report, Scene, rounds};
+use common::{Engine, Report, Scene, rounds, set};
 use glam::{DVec3, dvec3};
 use halite::field::Association;
 use halite::gpu::DeviceChoice;
@@ -26,24 +26,8 @@ use halite::render::{self, Renderer};
 use halite::transfer::{Emission, TransferFunction};
 use halite::view::{Blend, Camera, Projection, View};
 
-/// A renderer on `HALITE_TEST_DEVICE`, or the first device. Without any, tests are skipped, loudly; with
-/// `HALITE_REQUIRE_GPU=1` they fail.
 fn renderer() -> Option<Renderer> {
-    let name = std::env::var("HALITE_TEST_DEVICE").unwrap_or_else(|_| "0".into());
-    match Renderer::with_engine(2, DeviceChoice::Named(name), render::Engine::Project) {
-        Ok(renderer) => Some(renderer),
-        Err(e) if std::env::var("HALITE_REQUIRE_GPU").is_ok_and(|v| v == "1") => panic!("{e}"),
-        Err(e) => {
-            eprintln!("SKIPPED, as there is no device to test: {e}");
-            None
-        }
-    }
-}
-
-fn set(renderer: &mut Renderer, scene: &Scene) {
-    renderer.set_mesh(&scene.mesh, scene.tetrahedra.clone());
-    renderer.set_field(&scene.field).unwrap();
-    renderer.set_transfer(&scene.transfer);
+    common::on_device(render::Engine::Project)
 }
 
 fn image(renderer: &mut Renderer, switches: Switches, view: &View) -> Image {

@@ -3,19 +3,18 @@
 #![allow(
     clippy::expect_used,
     clippy::unwrap_used,
-    clippy::panic,
     clippy::print_stderr,
     reason = "a test fails by panicking, and tells what it measured"
 )]
 
 mod common;
 
-use common::Scene;
+use common::{Scene, set};
 use glam::{DVec3, dvec3};
 use halite::field::Association;
 use halite::gpu::DeviceChoice;
 use halite::image::Image;
-use halite::integral::choice::{Alpha, Choice, Form, Planes, Texels};
+use halite::integral::choice::{Alpha, Build, Choice, Form, Planes, Texels};
 use halite::integral::table::Kind;
 use halite::mesh::cells::Tetrahedra;
 use halite::mesh::generate;
@@ -26,25 +25,12 @@ use halite::transfer::{Emission, TransferFunction};
 use halite::view::{Blend, Camera, Projection, View};
 use std::path::Path;
 
-/// A renderer with each engine, on `HALITE_TEST_DEVICE` or the first device; without any, the CPU's alone, which is said.
+/// A renderer with each engine, if there is a device; without any, the CPU's alone.
 fn renderers() -> Vec<(&'static str, Renderer)> {
-    let name = std::env::var("HALITE_TEST_DEVICE").unwrap_or_else(|_| "0".into());
-    let choice = DeviceChoice::Named(name);
-    let mut all = vec![("cpu", Renderer::with_device(2, DeviceChoice::Cpu).unwrap())];
-    for (engine, name) in [(Engine::Traverse, "traverse"), (Engine::Project, "project")] {
-        match Renderer::with_engine(2, choice.clone(), engine) {
-            Ok(renderer) => all.push((name, renderer)),
-            Err(e) if std::env::var("HALITE_REQUIRE_GPU").is_ok_and(|v| v == "1") => panic!("{e}"),
-            Err(e) => eprintln!("SKIPPED, as there is no device to test: {e}"),
-        }
-    }
-    all
-}
-
-fn set(renderer: &mut Renderer, scene: &Scene) {
-    renderer.set_mesh(&scene.mesh, scene.tetrahedra.clone());
-    renderer.set_field(&scene.field).unwrap();
-    renderer.set_transfer(&scene.transfer);
+    let cpu = Renderer::with_device(2, DeviceChoice::Cpu).unwrap();
+    let others = [(Engine::Traverse, "traverse"), (Engine::Project, "project")];
+    let opened = others.into_iter().filter_map(|(engine, name)| Some((name, common::on_device(engine)?)));
+    std::iter::once(("cpu", cpu)).chain(opened).collect()
 }
 
 fn image(renderer: &mut Renderer, choice: Choice, view: &View) -> Image {
@@ -147,6 +133,37 @@ fn both_engines_draw_with_each_form() {
         }
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+/// Tables that the device builds draw what those do that it is handed; and after an edit the exact frame comes first, as ever.
+#[test]
+fn devices_build_what_they_draw_with() {
+    let (scene, other) = (waves(Emission::Chromatic), waves(Emission::Direct { scale: 0.4 }));
+    let view = view(PERSPECTIVE);
+    for (engine, renderer) in &mut renderers() {
+        for choice in [volume(Kind::LogNormalised, [128, 128, 12]), polynomial(2), cylindrical(Planes::Two)] {
+            let [handed, built] = [Build::Host, Build::Device].map(|build| {
+                set(renderer, &scene);
+                let choice = Choice { build, ..choice };
+                let first = image(renderer, choice, &view);
+                let uploaded = renderer.stats().uploaded_bytes;
+                assert!(renderer.stats().table_ms > 0.0, "{engine}, {build:?}");
+                renderer.set_transfer(&other.transfer);
+                renderer.render(&view, &|_| ()).unwrap();
+                assert_eq!(renderer.stats().integral, "exact", "{engine}, {build:?}");
+                renderer.wait_for_table();
+                (first, image(renderer, choice, &view), uploaded)
+            });
+            let apart = [(&handed.0, &built.0), (&handed.1, &built.1)].map(|(a, b)| a.compare(b).unwrap().max);
+            eprintln!("{engine}, {}: {apart:?}, {} and {} bytes", choice.form.name(), handed.2, built.2);
+            // Filters of real devices mix the same texels alike.
+            assert!(apart.iter().all(|&a| a < 2e-4), "{engine}, {choice:?}: {apart:?}");
+            assert!(*engine == "cpu" || built.2 + 100_000 < handed.2, "{engine}: {} {}", built.2, handed.2);
+        }
+        // What a device cannot build, the host does.
+        let degree = Choice { build: Build::Device, ..polynomial(6) };
+        assert!(image(renderer, degree, &view).pixels.iter().any(|p| p[3] > 0.5), "{engine}");
+    }
 }
 
 #[test]

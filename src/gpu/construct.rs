@@ -1,4 +1,7 @@
 //! Pre-integrated tables, built on a device: the same texels as `integral::table` has, in `shaders/construct.wgsl`.
+//!
+//! A `Plan` says what is dispatched for a table; `Builder` does it, and leaves the texels on the device. What draws
+//! copies them into its texture there ([`super::table`]), and [`Constructor`] hands them back, to be judged.
 
 use super::buffers::Buffer;
 use super::raster::{self, Readback, Slot};
@@ -6,6 +9,7 @@ use super::shader::{self, Variant};
 use super::{DeviceChoice, Gpu, function};
 use crate::error::Result;
 use crate::field::{self, Normal};
+use crate::integral::lookup::Stored;
 use crate::integral::table::{
     Cylindrical, Kind, Nodes, OPAQUE_DEPTH, Polynomial, Sampling, Steps, THINNEST, Table, length,
 };
@@ -19,6 +23,9 @@ const CONSTRUCT: &str = include_str!("../../shaders/construct.wgsl");
 
 /// Slices that one job knows the lengths of.
 const MOST_SLICES: usize = 256;
+
+/// Texels of rows that are copied to textures are a multiple of this: 256 bytes.
+const ROW: u32 = 16;
 
 /// How the texels of a volume are found.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,25 +53,9 @@ struct Job {
     longest: f32,
     degree: u32,
     count: u32,
-    unused: u32,
+    pitch: u32,
     lengths: [f32; MOST_SLICES],
     weights: [[f32; 8]; 5],
-}
-
-impl Job {
-    fn from(mut self, first: u32) -> Self {
-        self.first = first;
-        self
-    }
-}
-
-/// A device that builds tables of one function.
-pub struct Constructor {
-    gpu: Gpu,
-    layouts: [wgpu::BindGroupLayout; 2],
-    pipelines: [wgpu::ComputePipeline; 6],
-    function: [Buffer; 3],
-    exact: Exact<f64>,
 }
 
 /// Entry points, in the order of the pipelines.
@@ -79,127 +70,18 @@ const CYLINDER: usize = 5;
 /// One dispatch: which pipeline, with what, and how many groups.
 type Dispatch = (usize, Job, [u32; 3]);
 
-impl Constructor {
-    /// Opens what `choice` says, for tables of `transfer` over a field of one component that `normal` maps, on a mesh whose coordinates
-    /// were multiplied by `scale`. None if `choice` is the CPU, or there is no GPU and none was named.
-    ///
-    /// # Errors
-    /// [`crate::Error::Device`] if no adapter bears the name, it is of no use, or it cannot be opened.
-    pub fn open(
-        choice: &DeviceChoice,
-        transfer: &TransferFunction,
-        normal: &[Normal; 4],
-        scale: f64,
-    ) -> Result<Option<Self>> {
-        use Slot::{Read, Uniform, Write};
-        let Some(gpu) = Gpu::open(choice)? else { return Ok(None) };
-        let exact = Exact::<f64>::new(transfer, field::Kind::Scalar, normal, scale);
-        let variant = Variant { kind: field::Kind::Scalar, direct: exact.direct };
-        let source = [&shader::prelude(&variant), shader::INTEGRAL, CONSTRUCT].concat();
-        let module = raster::module(&gpu, "construct", &source);
-        let layouts = [
-            raster::layout(&gpu, Stages::COMPUTE, &[Uniform, Read, Read]),
-            raster::layout(&gpu, Stages::COMPUTE, &[Uniform, Read, Read, Read, Read, Write, Write]),
-        ];
-        let layout = raster::pipeline_layout(&gpu, &layouts.each_ref().map(Some));
-        let pipelines = ENTRIES.map(|entry| raster::compute(&gpu, &module, entry, &layout));
-        gpu.check()?;
-        let function = function::upload(&gpu, &Exact::<f32>::new(transfer, field::Kind::Scalar, normal, scale))?;
-        Ok(Some(Constructor { gpu, layouts, pipelines, function, exact }))
-    }
+/// What builds a table.
+struct Plan {
+    size: u32,
+    /// The function as a list of entries, where it is sampled.
+    list: Vec<[f32; 4]>,
+    dispatches: Vec<Dispatch>,
+    /// Rows of texels, and of what is made of them in the end, if anything.
+    rows: [u32; 2],
+}
 
-    /// The device's name.
-    pub fn name(&self) -> &str {
-        &self.gpu.adapter.name
-    }
-
-    /// A table of three parameters, and the milliseconds that the device took, without the way back. `None` as [`Table::new`], unless
-    /// there are as many values behind as in front, and for what a construction does not know.
-    ///
-    /// # Errors
-    /// [`crate::Error::Memory`] if the device has no room, and those of a device that fails.
-    pub fn volume(
-        &self,
-        kind: Kind,
-        size: [u32; 3],
-        longest: f64,
-        construction: Construction,
-    ) -> Result<Option<(Table, f64)>> {
-        let [n, h, slices] = size;
-        let normalised = kind == Kind::LogNormalised;
-        if n != h || n < 3 || slices < 3 || slices as usize > MOST_SLICES {
-            return Ok(None);
-        }
-        let mut job = self.job(n, slices, longest, (0..slices).map(|k| length(kind, slices, longest, k)));
-        job.normalised = u32::from(normalised);
-        let groups = [n.div_ceil(64), n, slices];
-        let closed = |job: Job, first: u32, count: u32| (CLOSED, job.from(first), [n.div_ceil(64), count, 1]);
-        let mut list = vec![];
-        let dispatches: Vec<Dispatch> = match construction {
-            Construction::Closed => vec![closed(job, 0, slices)],
-            _ if normalised => return Ok(None),
-            Construction::Incremental => {
-                let next = if kind == Kind::Uniform { LONGER } else { DOUBLED };
-                let of = [n.div_ceil(64), n, 1];
-                let steps = (2..slices).map(move |first| -> Dispatch { (next, job.from(first), of) });
-                std::iter::once(closed(job, 0, 2)).chain(steps).collect()
-            }
-            Construction::Sampled(Sampling { bits: Some(_), .. }) => return Ok(None),
-            Construction::Sampled(sampling) if sampling.entries < 2 => return Ok(None),
-            Construction::Sampled(sampling) => {
-                list = table::entries(&self.exact, sampling.entries);
-                let (samples, oversampling) = match sampling.steps {
-                    Steps::Same(samples) => (samples.max(1), 0.0),
-                    Steps::Touched(o) => (0, o as f32),
-                };
-                (job.entries, job.samples, job.oversampling) = (sampling.entries, samples, oversampling);
-                vec![(SAMPLED, job, groups)]
-            }
-        };
-        let count = n as usize * n as usize * slices as usize;
-        let Some((texels, ms)) = self.run(n, &list, &dispatches, [count, 0])? else { return Ok(None) };
-        Ok(Some((Table { kind, size, longest, direct: self.exact.direct, texels }, ms)))
-    }
-
-    /// Polynomials in closed form, and the milliseconds that the device took. `None` as [`Polynomial::new`], and for degrees beyond 4.
-    ///
-    /// # Errors
-    /// As [`Self::volume`].
-    pub fn polynomial(&self, degree: u32, size: u32, longest: f64) -> Result<Option<(Polynomial, f64)>> {
-        if size < 3 || !(1..=4).contains(&degree) {
-            return Ok(None);
-        }
-        let lengths = (1..=degree).map(|i| longest * f64::from(i) / f64::from(degree));
-        let mut job = self.job(size, degree, longest, lengths);
-        (job.degree, job.normalised) = (degree, 1);
-        for (row, of) in job.weights.iter_mut().zip(table::inverse(degree as usize)) {
-            row.iter_mut().zip(of).for_each(|(w, of)| *w = of as f32);
-        }
-        let slice = size as usize * size as usize;
-        let dispatches =
-            [(CLOSED, job, [size.div_ceil(64), degree, 1]), (COEFFICIENTS, job, [size.div_ceil(64), size, 1])];
-        let counts = [slice * degree as usize, slice * (degree as usize + 1)];
-        let Some((texels, ms)) = self.run(size, &[], &dispatches, counts)? else { return Ok(None) };
-        let texels = texels.chunks_exact(slice).map(<[_]>::to_vec).collect();
-        Ok(Some((Polynomial { degree, size, longest, direct: self.exact.direct, texels }, ms)))
-    }
-
-    /// A table in cylinder coordinates, in closed form, and the milliseconds that the device took. `None` as [`Cylindrical::new`].
-    ///
-    /// # Errors
-    /// As [`Self::volume`].
-    pub fn cylindrical(&self, planes: u32, size: u32, longest: f64) -> Result<Option<(Cylindrical, f64)>> {
-        if planes == 0 || !planes.is_multiple_of(4) || planes > 65_535 || size < 3 {
-            return Ok(None);
-        }
-        let job = self.job(size, planes, longest, std::iter::empty());
-        let count = planes as usize * size as usize * size as usize;
-        let dispatch = (CYLINDER, job, [size.div_ceil(64), planes, 1]);
-        let Some((texels, ms)) = self.run(size, &[], &[dispatch], [count, 0])? else { return Ok(None) };
-        Ok(Some((Cylindrical { planes, size, longest, texels }, ms)))
-    }
-
-    fn job(&self, size: u32, slices: u32, longest: f64, lengths: impl Iterator<Item = f64>) -> Job {
+impl Job {
+    fn new(size: u32, slices: u32, longest: f64, lengths: impl Iterator<Item = f64>) -> Self {
         let mut job = Job { size, slices, longest: longest as f32, ..Job::zeroed() };
         job.lengths.iter_mut().zip(lengths).for_each(|(to, l)| *to = l as f32);
         // Lengths of polynomials do not begin with 0.
@@ -208,40 +90,174 @@ impl Constructor {
         job
     }
 
-    /// Does `dispatches`, one after another, with room for so many texels and results; the results, or else the texels, and the time.
-    /// None if a binding has no room for them.
-    fn run(
+    fn from(mut self, first: u32) -> Self {
+        self.first = first;
+        self
+    }
+}
+
+impl Plan {
+    /// A table of three parameters. `None` as [`Table::new`], unless there are as many values behind as in front, and
+    /// for what a construction does not know.
+    fn volume(
+        exact: &Exact<f64>,
+        kind: Kind,
+        [n, h, slices]: [u32; 3],
+        longest: f64,
+        construction: Construction,
+    ) -> Option<Self> {
+        let normalised = kind == Kind::LogNormalised;
+        if n != h || n < 3 || slices < 3 || slices as usize > MOST_SLICES {
+            return None;
+        }
+        let mut job = Job::new(n, slices, longest, (0..slices).map(|k| length(kind, slices, longest, k)));
+        job.normalised = u32::from(normalised);
+        let closed = |job: Job, first: u32, count: u32| (CLOSED, job.from(first), [n.div_ceil(64), count, 1]);
+        let mut list = vec![];
+        let dispatches: Vec<Dispatch> = match construction {
+            Construction::Closed => vec![closed(job, 0, slices)],
+            _ if normalised => return None,
+            Construction::Incremental => {
+                let next = if kind == Kind::Uniform { LONGER } else { DOUBLED };
+                let of = [n.div_ceil(64), n, 1];
+                let steps = (2..slices).map(move |first| -> Dispatch { (next, job.from(first), of) });
+                std::iter::once(closed(job, 0, 2)).chain(steps).collect()
+            }
+            Construction::Sampled(Sampling { bits: Some(_), .. }) => return None,
+            Construction::Sampled(sampling) if sampling.entries < 2 => return None,
+            Construction::Sampled(sampling) => {
+                list = table::entries(exact, sampling.entries);
+                let (samples, oversampling) = match sampling.steps {
+                    Steps::Same(samples) => (samples.max(1), 0.0),
+                    Steps::Touched(o) => (0, o as f32),
+                };
+                (job.entries, job.samples, job.oversampling) = (sampling.entries, samples, oversampling);
+                vec![(SAMPLED, job, [n.div_ceil(64), n, slices])]
+            }
+        };
+        Some(Plan { size: n, list, dispatches, rows: [n * slices, 0] })
+    }
+
+    /// Polynomials in closed form. `None` as [`Polynomial::new`], and for degrees beyond 4.
+    fn polynomial(degree: u32, size: u32, longest: f64) -> Option<Self> {
+        if size < 3 || !(1..=4).contains(&degree) {
+            return None;
+        }
+        let lengths = (1..=degree).map(|i| longest * f64::from(i) / f64::from(degree));
+        let mut job = Job::new(size, degree, longest, lengths);
+        (job.degree, job.normalised) = (degree, 1);
+        for (row, of) in job.weights.iter_mut().zip(table::inverse(degree as usize)) {
+            row.iter_mut().zip(of).for_each(|(w, of)| *w = of as f32);
+        }
+        let groups = size.div_ceil(64);
+        let dispatches = vec![(CLOSED, job, [groups, degree, 1]), (COEFFICIENTS, job, [groups, size, 1])];
+        Some(Plan { size, list: vec![], dispatches, rows: [size * degree, size * (degree + 1)] })
+    }
+
+    /// A table in cylinder coordinates, in closed form. `None` as [`Cylindrical::new`].
+    fn cylindrical(planes: u32, size: u32, longest: f64) -> Option<Self> {
+        if planes == 0 || !planes.is_multiple_of(4) || planes > 65_535 || size < 3 {
+            return None;
+        }
+        let job = Job::new(size, planes, longest, std::iter::empty());
+        let dispatches = vec![(CYLINDER, job, [size.div_ceil(64), planes, 1])];
+        Some(Plan { size, list: vec![], dispatches, rows: [planes * size, 0] })
+    }
+
+    /// What builds `stored`, whatever its texels are now.
+    fn of(exact: &Exact<f64>, stored: &Stored) -> Option<Self> {
+        match stored {
+            Stored::Volume(t) => Plan::volume(exact, t.kind, t.size, t.longest, Construction::Closed),
+            Stored::Polynomial(t) => Plan::polynomial(t.degree, t.size, t.longest),
+            Stored::Cylindrical(t) => Plan::cylindrical(t.planes, t.size, t.longest),
+        }
+    }
+}
+
+/// Texels on a device, row by row.
+pub(crate) struct Texels {
+    pub(crate) buffer: Buffer,
+    /// Texels from one row to the next.
+    pub(crate) pitch: u32,
+    rows: u32,
+}
+
+/// The pipelines that build tables, for one kind of emission.
+#[derive(Debug)]
+pub(crate) struct Builder {
+    direct: bool,
+    layouts: [wgpu::BindGroupLayout; 2],
+    pipelines: [wgpu::ComputePipeline; 6],
+}
+
+impl Builder {
+    /// Compiles them.
+    ///
+    /// # Errors
+    /// Those of [`Gpu::check`].
+    pub(crate) fn new(gpu: &Gpu, direct: bool) -> Result<Self> {
+        use Slot::{Read, Uniform, Write};
+        let module = raster::module(gpu, "construct", &source(direct));
+        let layouts = [
+            raster::layout(gpu, Stages::COMPUTE, &[Uniform, Read, Read]),
+            raster::layout(gpu, Stages::COMPUTE, &[Uniform, Read, Read, Read, Read, Write, Write]),
+        ];
+        let layout = raster::pipeline_layout(gpu, &layouts.each_ref().map(Some));
+        let pipelines = ENTRIES.map(|entry| raster::compute(gpu, &module, entry, &layout));
+        gpu.check()?;
+        Ok(Builder { direct, layouts, pipelines })
+    }
+
+    /// Whether they are those for `exact`.
+    pub(crate) fn suits(&self, exact: &Exact<f64>) -> bool {
+        self.direct == exact.direct
+    }
+
+    /// Has the device build `stored` of the function `exact`, which `function` tells it; it may take its time. Rows are
+    /// so far apart that they can be copied to textures. None if it cannot, or has no binding so large.
+    ///
+    /// # Errors
+    /// [`crate::Error::Memory`] if the device has no room, and those of a device that fails.
+    pub(crate) fn build(
         &self,
-        size: u32,
-        list: &[[f32; 4]],
-        dispatches: &[Dispatch],
-        counts: [usize; 2],
-    ) -> Result<Option<(Vec<[f32; 4]>, f64)>> {
-        let gpu = &self.gpu;
+        gpu: &Gpu,
+        exact: &Exact<f64>,
+        function: &[Buffer; 3],
+        stored: &Stored,
+    ) -> Result<Option<Texels>> {
+        let Some(plan) = Plan::of(exact, stored) else { return Ok(None) };
+        let pitch = plan.size.next_multiple_of(ROW);
+        self.submit(gpu, exact, function, &plan, pitch)
+    }
+
+    fn submit(
+        &self,
+        gpu: &Gpu,
+        exact: &Exact<f64>,
+        function: &[Buffer; 3],
+        plan: &Plan,
+        pitch: u32,
+    ) -> Result<Option<Texels>> {
         let limits = gpu.device.limits();
         let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        let bytes = counts.map(|c| 16 * c as u64);
+        let bytes = plan.rows.map(|rows| 16 * u64::from(pitch) * u64::from(rows));
         if bytes.iter().any(|&b| b > most) {
             return Ok(None);
         }
-        let start = Instant::now();
-        let Nodes { parts, begin, nodes } = Nodes::new(&self.exact, size);
+        let Nodes { parts, begin, nodes } = Nodes::new(exact, plan.size);
         let uploaded = [
             Buffer::holding(gpu, "parts", &parts, Usage::STORAGE)?,
             Buffer::holding(gpu, "begin", &begin, Usage::STORAGE)?,
             Buffer::holding(gpu, "nodes", &nodes, Usage::STORAGE)?,
-            Buffer::holding(gpu, "list", list, Usage::STORAGE)?,
+            Buffer::holding(gpu, "list", &plan.list, Usage::STORAGE)?,
         ];
-        let [texels, result] = ["texels", "result"].map(|label| {
-            let of = usize::from(label == "result");
-            Buffer::new(gpu, label, bytes[of], Usage::STORAGE | Usage::COPY_SRC)
-        });
-        let (texels, result) = (texels?, result?);
-        let shared = raster::group(gpu, &self.layouts[0], self.function.iter().map(|b| b.raw.as_entire_binding()));
+        let texels = Buffer::new(gpu, "texels", bytes[0], Usage::STORAGE | Usage::COPY_SRC)?;
+        let result = Buffer::new(gpu, "result", bytes[1], Usage::STORAGE | Usage::COPY_SRC)?;
+        let shared = raster::group(gpu, &self.layouts[0], function.iter().map(|b| b.raw.as_entire_binding()));
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let mut jobs = vec![];
-        for (pipeline, job, [x, y, z]) in dispatches {
-            let job = Buffer::holding(gpu, "job", std::slice::from_ref(job), Usage::UNIFORM)?;
+        for (pipeline, job, [x, y, z]) in &plan.dispatches {
+            let job = Buffer::holding(gpu, "job", &[Job { pitch, ..*job }], Usage::UNIFORM)?;
             let all = std::iter::once(&job).chain(&uploaded).chain([&texels, &result]);
             let group = raster::group(gpu, &self.layouts[1], all.map(|b| b.raw.as_entire_binding()));
             let mut pass = encoder.begin_compute_pass(&Default::default());
@@ -253,12 +269,102 @@ impl Constructor {
             jobs.push(job);
         }
         gpu.queue.submit([encoder.finish()]);
+        gpu.check()?;
+        let of = usize::from(bytes[1] > 0);
+        let buffer = if of == 1 { result } else { texels };
+        Ok(Some(Texels { buffer, pitch, rows: plan.rows[of] }))
+    }
+}
+
+fn source(direct: bool) -> String {
+    let variant = Variant { kind: field::Kind::Scalar, direct };
+    [&shader::prelude(&variant), shader::INTEGRAL, CONSTRUCT].concat()
+}
+
+/// A device that builds tables of one function.
+pub struct Constructor {
+    gpu: Gpu,
+    builder: Builder,
+    function: [Buffer; 3],
+    exact: Exact<f64>,
+}
+
+impl Constructor {
+    /// Opens what `choice` says, for tables of `transfer` over a field of one component that `normal` maps, on a mesh
+    /// whose coordinates were multiplied by `scale`. None if `choice` is the CPU, or there is no GPU and none was
+    /// named.
+    ///
+    /// # Errors
+    /// [`crate::Error::Device`] if no adapter bears the name, it is of no use, or it cannot be opened.
+    pub fn open(
+        choice: &DeviceChoice,
+        transfer: &TransferFunction,
+        normal: &[Normal; 4],
+        scale: f64,
+    ) -> Result<Option<Self>> {
+        let Some(gpu) = Gpu::open(choice)? else { return Ok(None) };
+        let exact = Exact::<f64>::new(transfer, field::Kind::Scalar, normal, scale);
+        let builder = Builder::new(&gpu, exact.direct)?;
+        let function = function::upload(&gpu, &Exact::<f32>::new(transfer, field::Kind::Scalar, normal, scale))?;
+        Ok(Some(Constructor { gpu, builder, function, exact }))
+    }
+
+    /// The device's name.
+    pub fn name(&self) -> &str {
+        &self.gpu.adapter.name
+    }
+
+    /// A table of three parameters, and the milliseconds that the device took, without the way back. `None` as
+    /// [`Table::new`], unless there are as many values behind as in front, and for what a construction does not know.
+    ///
+    /// # Errors
+    /// [`crate::Error::Memory`] if the device has no room, and those of a device that fails.
+    pub fn volume(
+        &self,
+        kind: Kind,
+        size: [u32; 3],
+        longest: f64,
+        construction: Construction,
+    ) -> Result<Option<(Table, f64)>> {
+        let plan = Plan::volume(&self.exact, kind, size, longest, construction);
+        let Some((texels, ms)) = self.run(plan)? else { return Ok(None) };
+        Ok(Some((Table { kind, size, longest, direct: self.exact.direct, texels }, ms)))
+    }
+
+    /// Polynomials in closed form, and the milliseconds that the device took. `None` as [`Polynomial::new`], and for
+    /// degrees beyond 4.
+    ///
+    /// # Errors
+    /// As [`Self::volume`].
+    pub fn polynomial(&self, degree: u32, size: u32, longest: f64) -> Result<Option<(Polynomial, f64)>> {
+        let Some((texels, ms)) = self.run(Plan::polynomial(degree, size, longest))? else { return Ok(None) };
+        let texels = texels.chunks_exact(size as usize * size as usize).map(<[_]>::to_vec).collect();
+        Ok(Some((Polynomial { degree, size, longest, direct: self.exact.direct, texels }, ms)))
+    }
+
+    /// A table in cylinder coordinates, in closed form, and the milliseconds that the device took. `None` as
+    /// [`Cylindrical::new`].
+    ///
+    /// # Errors
+    /// As [`Self::volume`].
+    pub fn cylindrical(&self, planes: u32, size: u32, longest: f64) -> Result<Option<(Cylindrical, f64)>> {
+        let Some((texels, ms)) = self.run(Plan::cylindrical(planes, size, longest))? else { return Ok(None) };
+        Ok(Some((Cylindrical { planes, size, longest, texels }, ms)))
+    }
+
+    /// The texels of a plan, and the time until they were there. None without a plan, and if a binding has no room for
+    /// them.
+    fn run(&self, plan: Option<Plan>) -> Result<Option<(Vec<[f32; 4]>, f64)>> {
+        let Some(plan) = plan else { return Ok(None) };
+        let (gpu, start) = (&self.gpu, Instant::now());
+        let built = self.builder.submit(gpu, &self.exact, &self.function, &plan, plan.size)?;
+        let Some(Texels { buffer, pitch, rows }) = built else { return Ok(None) };
         gpu.wait()?;
         let ms = start.elapsed().as_secs_f64() * 1e3;
-        let (from, bytes) = if bytes[1] > 0 { (&result, bytes[1]) } else { (&texels, bytes[0]) };
+        let bytes = 16 * u64::from(pitch) * u64::from(rows);
         let back = Readback::new(gpu, bytes)?;
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        encoder.copy_buffer_to_buffer(&from.raw, 0, back.raw(), 0, bytes);
+        encoder.copy_buffer_to_buffer(&buffer.raw, 0, back.raw(), 0, bytes);
         let texels = back.submit(gpu, encoder, |bytes| bytemuck::cast_slice::<u8, [f32; 4]>(bytes).to_vec())?;
         Ok(Some((texels, ms)))
     }
@@ -271,28 +377,51 @@ impl std::fmt::Debug for Constructor {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "tests")]
+#[allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
 mod tests {
     use super::*;
     use crate::gpu::testing;
     use crate::integral::table::tests::{apart_texels, transfers};
+    use wgpu::naga;
 
     const NORMAL: [Normal; 4] = [Normal { mid: 0.0, half: 1.0 }; 4];
 
     #[test]
-    fn shaders_are_valid() {
+    fn jobs_are_laid_out_as_the_shader_has_them() {
         for direct in [false, true] {
-            let variant = Variant { kind: field::Kind::Scalar, direct };
-            testing::validated(&[&shader::prelude(&variant), shader::INTEGRAL, CONSTRUCT].concat());
+            let module = testing::validated(&source(direct));
+            let (_, job) = module.types.iter().find(|(_, t)| t.name.as_deref() == Some("Job")).unwrap();
+            let naga::TypeInner::Struct { span, members } = &job.inner else { panic!("no struct") };
+            assert_eq!(*span as usize, size_of::<Job>());
+            let got: Vec<_> = members.iter().map(|m| (m.name.as_deref().unwrap(), m.offset as usize)).collect();
+            macro_rules! offsets {
+                ($($field:ident),*) => { [$((stringify!($field), std::mem::offset_of!(Job, $field))),*] };
+            }
+            let want = offsets!(
+                size,
+                slices,
+                first,
+                normalised,
+                entries,
+                samples,
+                oversampling,
+                most,
+                longest,
+                degree,
+                count,
+                pitch,
+                lengths,
+                weights
+            );
+            assert_eq!(got, want);
         }
-        assert_eq!(size_of::<Job>(), 48 + 16 * 64 + 16 * 10);
     }
 
     /// What the device builds is what the CPU builds: in closed form the exact integral, else the same approximation.
     #[test]
     fn tables_are_those_of_the_cpu() {
         let Some(choice) = testing::choice() else { return };
-        for (name, transfer) in transfers() {
+        for (name, transfer) in transfers(77) {
             let device = Constructor::open(&choice, &transfer, &NORMAL, 1.0).unwrap().unwrap();
             let exact = &device.exact;
             let near = |got: &[[f32; 4]], want: &[[f32; 4]], most: f32, what: &str| {

@@ -2,12 +2,13 @@
 
 use super::Gpu;
 use super::buffers::Buffer;
+use super::construct::{Builder, Texels as BuiltTexels};
 use super::raster::{Slot, Texture};
 use crate::error::{Error, Result};
-use crate::integral::Lookup;
-use crate::integral::choice::{Alpha, Planes, Texels};
+use crate::integral::choice::{Alpha, Build, Choice, Form, Planes, Texels};
 use crate::integral::lookup::{Range, Stored};
 use crate::integral::table::{Cylindrical, Kind, length};
+use crate::integral::{Exact, Lookup};
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
 use wgpu::{BufferUsages as Usage, TextureDimension, TextureFormat, TextureUsages};
@@ -88,35 +89,57 @@ pub(crate) struct OnDevice {
 
 /// The table that a device holds, and its twin on the host.
 #[derive(Debug, Default)]
-pub(crate) struct Held(Option<(Option<Arc<Lookup>>, OnDevice)>);
+pub(crate) struct Held {
+    table: Option<(Option<Arc<Lookup>>, OnDevice)>,
+    builder: Option<Builder>,
+}
 
 impl Held {
-    /// Hands over `table` unless it is there; without one, the smallest that can be bound.
+    /// Hands over `table` unless it is there, or has the device build it of the function that `function` tells; without one, the smallest
+    /// that can be bound.
     ///
     /// # Errors
-    /// Those of [`OnDevice::holding`].
-    pub(crate) fn prepare(&mut self, gpu: &Gpu, table: Option<&Arc<Lookup>>) -> Result<()> {
+    /// Those of [`OnDevice::holding`] and [`OnDevice::building`].
+    pub(crate) fn prepare(&mut self, gpu: &Gpu, table: Option<&Arc<Lookup>>, function: &[Buffer; 3]) -> Result<()> {
         let same = |(held, _): &(Option<Arc<Lookup>>, OnDevice)| match (held, table) {
             (Some(a), Some(b)) => Arc::ptr_eq(a, b),
             (None, None) => true,
             _ => false,
         };
-        if self.0.as_ref().is_none_or(|h| !same(h)) {
+        if self.table.as_ref().is_none_or(|h| !same(h)) {
             // The old one's memory first.
-            self.0 = None;
-            let on_device = match table {
+            self.table = None;
+            let on_device = match table.map(|t| (t, t.source())) {
                 None => OnDevice::none(gpu)?,
-                Some(table) => OnDevice::holding(gpu, table)?,
+                Some((table, None)) => OnDevice::holding(gpu, table)?,
+                Some((table, Some(exact))) => {
+                    let builder = match self.builder.take().filter(|b| b.suits(exact)) {
+                        Some(builder) => builder,
+                        None => Builder::new(gpu, exact.direct)?,
+                    };
+                    OnDevice::building(gpu, table, exact, self.builder.insert(builder), function)?
+                }
             };
-            self.0 = Some((table.cloned(), on_device));
+            self.table = Some((table.cloned(), on_device));
         }
         Ok(())
     }
 
     /// What was prepared last.
     pub(crate) fn get(&self) -> Option<&OnDevice> {
-        self.0.as_ref().map(|h| &h.1)
+        self.table.as_ref().map(|h| &h.1)
     }
+}
+
+/// Whether `gpu` is to build the tables of `choice` itself, rather than be handed them.
+pub(crate) fn builds(gpu: &Gpu, choice: &Choice) -> bool {
+    let wanted = match choice.build {
+        Build::Auto => gpu.adapter.kind != "CPU",
+        Build::Host => false,
+        Build::Device => true,
+    };
+    let packed = choice.form == Form::Cylindrical && choice.planes == Planes::Packed;
+    wanted && choice.texels == Texels::Float && !packed
 }
 
 impl OnDevice {
@@ -150,41 +173,90 @@ impl OnDevice {
     /// [`Buffer::new`].
     pub(crate) fn holding(gpu: &Gpu, table: &Lookup) -> Result<Self> {
         let format = texel_format(gpu, table.choice().texels)?;
+        let on_device = Self::empty(gpu, table, format)?;
+        let (OnDevice { volume, layers: (layers, _), .. }, ranges) = (&on_device, table.ranges());
+        let mut writer = Writer { gpu, format, pending: 0 };
+        match table.stored() {
+            Stored::Volume(t) => {
+                let [w, h, _] = t.size;
+                for (z, slice) in (0..).zip(t.texels.chunks((w * h) as usize)) {
+                    writer.write(volume, [0, 0, z], [w, h], slice, &ranges[0])?;
+                }
+            }
+            Stored::Polynomial(t) => {
+                for (power, (texels, range)) in (0..).zip(t.texels.iter().zip(ranges)) {
+                    writer.write(layers, [0, 0, power], [t.size; 2], texels, range)?;
+                }
+            }
+            Stored::Cylindrical(t) => {
+                let tiles = Tiles::new(gpu, t, table.choice().planes == Planes::Packed);
+                for tile in 0..tiles.count {
+                    let texels = tiles.texels(t, tile);
+                    writer.write(layers, tiles.corner(tile), tiles.tile, &texels, &ranges[0])?;
+                }
+            }
+        }
+        Ok(on_device)
+    }
+
+    /// Has the device build `table` of the function `exact`, which `function` tells it. Does not wait for it: what the device is asked to do
+    /// later comes after.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if it cannot build such a table or has no bindings so large, and those of [`Self::holding`].
+    pub(crate) fn building(
+        gpu: &Gpu,
+        table: &Lookup,
+        exact: &Exact<f64>,
+        builder: &Builder,
+        function: &[Buffer; 3],
+    ) -> Result<Self> {
+        let on_device = Self::empty(gpu, table, texel_format(gpu, Texels::Float)?)?;
+        let (OnDevice { volume, layers: (layers, _), .. }, [w, h, depth]) = (&on_device, table.size());
+        let Some(built) = builder.build(gpu, exact, function, table.stored())? else {
+            let name = &gpu.adapter.name;
+            return Err(Error::Device(format!("{name} cannot build a table of {w} x {h} x {depth} texels itself")));
+        };
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        match table.stored() {
+            Stored::Volume(_) => copy(&mut encoder, &built, 0, volume, [0; 3], [w, h, depth]),
+            Stored::Polynomial(_) => copy(&mut encoder, &built, 0, layers, [0; 3], [w, h, depth]),
+            Stored::Cylindrical(t) => {
+                let tiles = Tiles::new(gpu, t, false);
+                for tile in 0..tiles.count {
+                    copy(&mut encoder, &built, tile * h, layers, tiles.corner(tile), [w, h, 1]);
+                }
+            }
+        }
+        gpu.queue.submit([encoder.finish()]);
+        gpu.check()?;
+        Ok(on_device)
+    }
+
+    /// Textures that have room for `table`, and what shaders must know of it.
+    fn empty(gpu: &Gpu, table: &Lookup, format: TextureFormat) -> Result<Self> {
         let ([x, y, z], longest) = (table.size().map(|n| n as f32), table.longest() as f32);
         let mut parameters = Parameters { size: [x, y, z, longest], ..Parameters::zeroed() };
         for (i, range) in table.ranges().iter().enumerate().take(POWERS) {
             (parameters.span[i], parameters.least[i]) = (range.span, range.least);
         }
         let small = TextureFormat::Rgba8Unorm;
-        let mut writer = Writer { gpu, format, pending: 0 };
+        let layered = |size| {
+            Ok((texture(gpu, TextureDimension::D3, [1; 3], small)?, texture(gpu, TextureDimension::D2, size, format)?))
+        };
         let (volume, layers) = match table.stored() {
             Stored::Volume(t) => {
                 if t.kind != Kind::Uniform {
                     parameters.size[3] = length(t.kind, t.size[2], t.longest, 1) as f32;
                 }
                 let volume = texture(gpu, TextureDimension::D3, t.size, format)?;
-                let [w, h, _] = t.size;
-                for (z, slice) in (0..).zip(t.texels.chunks((w * h) as usize)) {
-                    writer.write(&volume, [0, 0, z], [w, h], slice, &table.ranges()[0])?;
-                }
                 (volume, texture(gpu, TextureDimension::D2, [1; 3], small)?)
             }
-            Stored::Polynomial(t) => {
-                let layers = texture(gpu, TextureDimension::D2, [t.size, t.size, t.degree + 1], format)?;
-                for (power, (texels, range)) in (0..).zip(t.texels.iter().zip(table.ranges())) {
-                    writer.write(&layers, [0, 0, power], [t.size; 2], texels, range)?;
-                }
-                (texture(gpu, TextureDimension::D3, [1; 3], small)?, layers)
-            }
+            Stored::Polynomial(_) => layered(table.size())?,
             Stored::Cylindrical(t) => {
                 let tiles = Tiles::new(gpu, t, table.choice().planes == Planes::Packed);
                 parameters.tiles = tiles.parameters();
-                let layers = texture(gpu, TextureDimension::D2, tiles.size(), format)?;
-                for tile in 0..tiles.count {
-                    let texels = tiles.texels(t, tile);
-                    writer.write(&layers, tiles.corner(tile), tiles.tile, &texels, &table.ranges()[0])?;
-                }
-                (texture(gpu, TextureDimension::D3, [1; 3], small)?, layers)
+                layered(tiles.size())?
             }
         };
         Self::new(gpu, volume, layers, parameters)
@@ -211,6 +283,30 @@ fn texture(gpu: &Gpu, dimension: TextureDimension, size: [u32; 3], format: Textu
         )));
     }
     Texture::new(gpu, "table", dimension, size, format, TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_DST)
+}
+
+/// Copies rows of what was built, from the row `first` on, to where `texture` has `size` texels.
+fn copy(
+    encoder: &mut wgpu::CommandEncoder,
+    built: &BuiltTexels,
+    first: u32,
+    texture: &Texture,
+    [x, y, z]: [u32; 3],
+    [width, height, depth]: [u32; 3],
+) {
+    let row = 16 * built.pitch;
+    encoder.copy_buffer_to_texture(
+        wgpu::TexelCopyBufferInfo {
+            buffer: &built.buffer.raw,
+            layout: wgpu::TexelCopyBufferLayout {
+                offset: u64::from(first) * u64::from(row),
+                bytes_per_row: Some(row),
+                rows_per_image: Some(height),
+            },
+        },
+        wgpu::TexelCopyTextureInfo { origin: wgpu::Origin3d { x, y, z }, ..texture.raw.as_image_copy() },
+        wgpu::Extent3d { width, height, depth_or_array_layers: depth },
+    );
 }
 
 /// Hands texels over, some at a time.

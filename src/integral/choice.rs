@@ -26,6 +26,8 @@ pub struct Choice {
     pub per_cell: bool,
     /// What a table's texels are.
     pub texels: Texels,
+    /// Where tables are built for a device.
+    pub build: Build,
 }
 
 impl Default for Choice {
@@ -39,6 +41,7 @@ impl Default for Choice {
             planes: Planes::default(),
             per_cell: false,
             texels: Texels::default(),
+            build: Build::default(),
         }
     }
 }
@@ -111,6 +114,20 @@ pub enum Texels {
     Unorm16,
     /// 8 bits, likewise.
     Unorm8,
+}
+
+/// Where tables are built that a device looks up. Devices build tables of 32-bit floats, with as many values behind as in front, and not
+/// [`Planes::Packed`]; others are always built on the host.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Build {
+    /// On the device, unless that is software.
+    #[default]
+    Auto,
+    /// On the processor, from where they are handed over.
+    Host,
+    /// On the device, be it software: frames then wait behind that.
+    Device,
 }
 
 /// Knots that the mean cell spans, up to which [`Form::Auto`] is exact.

@@ -11,6 +11,9 @@ use crate::real::Real;
 /// case, some 20 times what is seen.
 const UNIFORM_ERROR: f64 = 0.02;
 
+/// What bounds the error of other tables that are smaller than the number of knots asks for.
+const SMALL_ERROR: f64 = 2e-3;
+
 /// A table of one of the forms.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Stored {
@@ -36,6 +39,8 @@ pub struct Lookup {
     direct: bool,
     /// The reciprocal of the longest length, or for volumes of the thinnest slice but 0.
     inverse: f32,
+    /// Of what function a device builds it, which alone has its texels then.
+    source: Option<Box<Exact<f64>>>,
 }
 
 /// What is integrated, in whatever form: the exact integral is always there.
@@ -53,25 +58,50 @@ impl Lookup {
     /// # Errors
     /// Those of [`Choice::check`]; [`Error::Render`] for fields of several components, of which tables have no room.
     pub fn new(exact: &Exact<f64>, choice: &Choice, longest: f64) -> Result<Self> {
-        let mut size = choice.size(exact.opacity.len());
-        if (choice.form, choice.lengths, choice.table) == (Form::Volume, Kind::Uniform, None) {
-            size = table::size(exact, longest, UNIFORM_ERROR).unwrap_or(size);
-        }
-        check(choice, size, exact.kind)?;
-        let [front, _, depth] = size;
+        let [front, back, depth] = sized(exact, choice, longest)?;
         let stored = match choice.form {
-            Form::Volume => Table::closed(exact, choice.lengths, size, longest).map(Stored::Volume),
+            Form::Volume => Table::closed(exact, choice.lengths, [front, back, depth], longest).map(Stored::Volume),
             Form::Polynomial => Polynomial::closed(exact, choice.degree, front, longest).map(Stored::Polynomial),
             Form::Cylindrical => Cylindrical::closed(exact, depth, front, longest).map(Stored::Cylindrical),
             Form::Auto | Form::Exact => None,
         };
+        Self::of(exact, choice, stored)
+    }
+
+    /// The same table, without texels: those are for a device to build.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub(crate) fn outline(exact: &Exact<f64>, choice: &Choice, longest: f64) -> Result<Self> {
+        let [front, back, depth] = sized(exact, choice, longest)?;
+        let (direct, kind, degree) = (exact.direct, choice.lengths, choice.degree);
+        let stored = match choice.form {
+            Form::Volume => {
+                Some(Stored::Volume(Table { kind, size: [front, back, depth], longest, direct, texels: vec![] }))
+            }
+            Form::Polynomial => {
+                let texels = vec![vec![]; degree as usize + 1];
+                Some(Stored::Polynomial(Polynomial { degree, size: front, longest, direct, texels }))
+            }
+            Form::Cylindrical => {
+                Some(Stored::Cylindrical(Cylindrical { planes: depth, size: front, longest, texels: vec![] }))
+            }
+            Form::Auto | Form::Exact => None,
+        };
+        let choice = Choice { texels: Texels::Float, ..*choice };
+        Ok(Lookup { source: Some(Box::new(exact.clone())), ..Self::of(exact, &choice, stored)? })
+    }
+
+    fn of(exact: &Exact<f64>, choice: &Choice, stored: Option<Stored>) -> Result<Self> {
         let stored = stored.ok_or_else(|| Error::Render("the exact integral has no table".into()))?;
         let unit = match &stored {
-            Stored::Volume(t) if t.kind != Kind::Uniform => length(t.kind, depth, longest, 1),
-            _ => longest,
+            Stored::Volume(t) if t.kind != Kind::Uniform => length(t.kind, t.size[2], t.longest, 1),
+            Stored::Volume(Table { longest, .. })
+            | Stored::Polynomial(Polynomial { longest, .. })
+            | Stored::Cylindrical(Cylindrical { longest, .. }) => *longest,
         };
         let inverse = (1.0 / unit) as f32;
-        let mut table = Lookup { choice: *choice, ranges: vec![], stored, direct: exact.direct, inverse };
+        let mut table = Lookup { choice: *choice, ranges: vec![], stored, direct: exact.direct, inverse, source: None };
         table.round();
         Ok(table)
     }
@@ -108,6 +138,11 @@ impl Lookup {
     /// What was chosen.
     pub fn choice(&self) -> &Choice {
         &self.choice
+    }
+
+    /// The function of which a device builds the texels, if these are not here.
+    pub(crate) fn source(&self) -> Option<&Exact<f64>> {
+        self.source.as_deref()
     }
 
     pub(crate) fn stored(&self) -> &Stored {
@@ -215,6 +250,29 @@ impl Lookup {
             light.add([r, g, b], alpha);
         }
     }
+}
+
+/// Texels along the axes of the table that `choice` says: where nobody said how many, by the bounds of its error.
+fn sized(exact: &Exact<f64>, choice: &Choice, longest: f64) -> Result<[u32; 3]> {
+    let mut size = choice.size(exact.opacity.len());
+    check(choice, size, exact.kind)?;
+    if choice.table.is_none() {
+        let [front, _, depth] = size;
+        // Fewer values than the knots ask for, where that is known to be enough.
+        let fewer = match (choice.form, choice.lengths) {
+            (Form::Polynomial, _) => table::values_of_polynomial(exact, choice.degree, longest, SMALL_ERROR, front / 2),
+            (Form::Volume, Kind::LogNormalised) => {
+                table::values_of_normalised(exact, depth, longest, SMALL_ERROR, front / 2)
+            }
+            _ => None,
+        };
+        size = match (choice.form, choice.lengths, fewer) {
+            (Form::Volume, Kind::Uniform, _) => table::size(exact, longest, UNIFORM_ERROR).unwrap_or(size),
+            (_, _, Some(fewer)) => [fewer, fewer, depth],
+            _ => size,
+        };
+    }
+    Ok(size)
 }
 
 /// Whether `choice` can be drawn with, of that size and for fields of this kind.

@@ -148,7 +148,7 @@ impl Project {
     }
 
     /// Hands over what the device does not hold yet.
-    fn upload<const N: usize>(&mut self, geometry: &Geometry, values: &Values<N>, exact: &Exact<f32>) -> Result<()> {
+    fn upload<const N: usize>(&mut self, geometry: &Geometry, values: &Values<N>) -> Result<()> {
         let gpu = &self.gpu;
         if self.cells.is_none() {
             self.cells = Some(Chunks::new(gpu, "cells", &geometry.cells, |c| c.corners)?);
@@ -159,14 +159,24 @@ impl Project {
         if self.values.is_none() {
             self.values = Some(arrays::values(gpu, values)?);
         }
-        if self.function.is_none() {
-            self.function = Some(HeldFunction {
+        Ok(())
+    }
+
+    /// Has the device hold the function and `table`, or build that, unless it does.
+    ///
+    /// # Errors
+    /// Those of [`table::Held::prepare`].
+    pub(crate) fn prepare_table(&mut self, exact: &Exact<f32>, table: Option<&Arc<Lookup>>) -> Result<()> {
+        let gpu = &self.gpu;
+        let function = match self.function.take() {
+            Some(function) => function,
+            None => HeldFunction {
                 buffers: function::upload(gpu, exact)?,
                 lines: function::lines(gpu, exact)?,
                 filled: Buffer::holding(gpu, "filled", &filled(exact), Usage::STORAGE)?,
-            });
-        }
-        Ok(())
+            },
+        };
+        self.table.prepare(gpu, table, &self.function.insert(function).buffers)
     }
 
     /// Draws a frame; premultiplied colours, row by row.
@@ -188,8 +198,8 @@ impl Project {
             return Err(Error::View(what.into()));
         }
         let format = self.format(switches.target)?;
-        self.upload(geometry, values, exact)?;
-        self.table.prepare(&self.gpu, table)?;
+        self.upload(geometry, values)?;
+        self.prepare_table(exact, table)?;
         let association = arrays::association(values);
         let arrays = self.arrays()?;
         let seen = Seen::new(geometry, view);

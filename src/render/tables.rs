@@ -1,7 +1,8 @@
 //! Tables, built while frames are drawn.
 //!
-//! A frame that cannot wait is drawn with the exact integral until its table is there: it is never of another function than it
-//! should be.
+//! A frame that cannot wait is drawn with the exact integral until its table is there: it is never of another function
+//! than it should be. Tables that the device builds are there as soon as they were asked for, as it does one thing
+//! after another; that is asked for after the frame that did not wait.
 
 use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Values};
@@ -19,6 +20,8 @@ pub(super) struct Key {
     pub(super) exact: Exact<f64>,
     pub(super) choice: Choice,
     pub(super) longest: f64,
+    /// The device that draws builds it.
+    pub(super) on_device: bool,
 }
 
 /// A table, and the ms that building it took.
@@ -40,14 +43,15 @@ pub(super) struct Tables {
 impl Key {
     fn build(&self) -> Result<Built> {
         let start = Instant::now();
-        let table = Lookup::new(&self.exact, &self.choice, self.longest)?;
+        let make = if self.on_device { Lookup::outline } else { Lookup::new };
+        let table = make(&self.exact, &self.choice, self.longest)?;
         Ok(Built { table: Arc::new(table), ms: start.elapsed().as_secs_f64() * 1e3 })
     }
 }
 
 impl Tables {
-    /// The table of `key`; none if it is not there yet, and the caller does not `wait` for it. `own` is the pool of a caller
-    /// that waits.
+    /// The table of `key`; none if it is not there yet, and the caller does not `wait` for it. `own` is the pool of a
+    /// caller that waits.
     ///
     /// # Errors
     /// Those of [`Lookup::new`].
@@ -67,14 +71,18 @@ impl Tables {
         Ok(None)
     }
 
-    /// Begins to build the table of `key`, unless it is there; after the frame that it was too late for, so that it does not
-    /// take that frame's time. `own` is the caller's pool.
+    /// Begins to build the table of `key`, unless it is there; after the frame that it was too late for, so that it
+    /// does not take that frame's time. `own` is the caller's pool.
     ///
     /// # Errors
     /// [`Error::Render`] if no thread can be started.
     pub(super) fn start(&mut self, key: &Arc<Key>, own: &rayon::ThreadPool) -> Result<()> {
         // One at a time: what is asked for last comes next.
         if self.building.is_some() || self.ready.as_ref().is_some_and(|r| r.0 == *key) {
+            return Ok(());
+        }
+        if key.on_device {
+            self.ready = Some((Arc::clone(key), key.build()?));
             return Ok(());
         }
         let (sender, receiver) = channel();
@@ -85,6 +93,18 @@ impl Tables {
         });
         self.building = Some((Arc::clone(key), receiver));
         Ok(())
+    }
+
+    /// The table of `key`, if it is there.
+    pub(super) fn ready(&self, key: &Arc<Key>) -> Option<&Built> {
+        self.ready.as_ref().filter(|r| r.0 == *key).map(|r| &r.1)
+    }
+
+    /// Notes what building the table of `key` took.
+    pub(super) fn took(&mut self, key: &Arc<Key>, ms: f64) {
+        if let Some((_, built)) = self.ready.as_mut().filter(|r| r.0 == *key) {
+            built.ms += ms;
+        }
     }
 
     /// Takes what has been built, waiting for it if it is `key`'s.
@@ -116,7 +136,8 @@ impl Tables {
     }
 }
 
-/// How many knots of the function the values of the mean cell have between them; of a sample, where there are many cells.
+/// How many knots of the function the values of the mean cell have between them; of a sample, where there are many
+/// cells.
 pub(super) fn knots_in_cells(geometry: &Geometry, values: &Values<1>, exact: &Exact<f32>) -> f64 {
     let knots = exact.opacity.places();
     let step = geometry.cells.len().div_ceil(SAMPLES).max(1);

@@ -189,6 +189,18 @@ impl Traverse {
         Ok(())
     }
 
+    /// Has the device hold `table`, or build it, unless it does.
+    ///
+    /// # Errors
+    /// Those of [`table::Held::prepare`].
+    pub(crate) fn prepare_table(&mut self, exact: &Exact<f32>, table: Option<&Arc<Lookup>>) -> Result<()> {
+        let function = match self.function.take() {
+            Some(function) => function,
+            None => function::upload(&self.gpu, exact)?,
+        };
+        self.table.prepare(&self.gpu, table, self.function.insert(function))
+    }
+
     /// Draws a frame.
     ///
     /// # Errors
@@ -202,7 +214,7 @@ impl Traverse {
         view: &View,
     ) -> Result<Drawn> {
         self.upload(geometry, values, exact)?;
-        self.table.prepare(&self.gpu, table)?;
+        self.prepare_table(exact, table)?;
         let association = arrays::association(values);
         let arrays = self.arrays()?;
         let variant = Variant { kind: exact.kind, direct: exact.direct };

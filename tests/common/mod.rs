@@ -4,6 +4,7 @@
 #![allow(
     clippy::expect_used,
     clippy::unwrap_used,
+    clippy::panic,
     clippy::print_stderr,
     reason = "a test fails by panicking, and tells what it measured"
 )]
@@ -17,7 +18,7 @@ use halite::image::{Backdrop, Image};
 use halite::mesh::cells::Tetrahedra;
 use halite::mesh::{Array, Mesh};
 use halite::reference;
-use halite::render::Renderer;
+use halite::render::{self, Renderer};
 use halite::transfer::TransferFunction;
 use halite::view::View;
 use std::path::{Path, PathBuf};
@@ -73,9 +74,7 @@ impl Engine {
         match self {
             Engine::Twin { threads } => {
                 let mut renderer = Renderer::with_device(threads, DeviceChoice::Cpu).unwrap();
-                renderer.set_mesh(mesh, tetrahedra.clone());
-                renderer.set_field(field).unwrap();
-                renderer.set_transfer(transfer);
+                set(&mut renderer, scene);
                 views.iter().map(|view| renderer.render(view, &|_| ()).unwrap()).collect()
             }
             Engine::Reference => {
@@ -89,6 +88,27 @@ impl Engine {
     pub(crate) fn image(self, scene: &Scene, view: &View) -> Image {
         self.draw(scene, std::slice::from_ref(view)).remove(0)
     }
+}
+
+/// A renderer with `engine` on `HALITE_TEST_DEVICE`, or the first device. Without any there is none, which is said loudly; with
+/// `HALITE_REQUIRE_GPU=1` that is a failure.
+pub(crate) fn on_device(engine: render::Engine) -> Option<Renderer> {
+    let name = std::env::var("HALITE_TEST_DEVICE").unwrap_or_else(|_| "0".into());
+    match Renderer::with_engine(2, DeviceChoice::Named(name), engine) {
+        Ok(renderer) => Some(renderer),
+        Err(e) if std::env::var("HALITE_REQUIRE_GPU").is_ok_and(|v| v == "1") => panic!("{e}"),
+        Err(e) => {
+            eprintln!("SKIPPED, as there is no device to test: {e}");
+            None
+        }
+    }
+}
+
+/// Has `renderer` draw `scene`.
+pub(crate) fn set(renderer: &mut Renderer, scene: &Scene) {
+    renderer.set_mesh(&scene.mesh, scene.tetrahedra.clone());
+    renderer.set_field(&scene.field).unwrap();
+    renderer.set_transfer(&scene.transfer);
 }
 
 /// Rounds of randomised tests: `normal`, or twenty times as many with HALITE_LONG=1.

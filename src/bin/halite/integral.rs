@@ -3,7 +3,7 @@
 use crate::variant::{named, table};
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use halite::integral::choice::{Alpha, Choice, Form, Planes, Texels};
+use halite::integral::choice::{Alpha, Build, Choice, Form, Planes, Texels};
 use halite::integral::table::Kind;
 use halite::scene::Scene;
 use serde_json::Value;
@@ -36,6 +36,9 @@ pub(crate) struct Integral {
     /// What the table's texels are: float, unorm16 or unorm8
     #[arg(long, value_name = "FORMAT", value_parser = named::<Texels>, help_heading = "Integral")]
     texels: Option<Texels>,
+    /// Where tables are built: auto (on the device, unless it is software), host or device
+    #[arg(long, value_name = "WHERE", value_parser = named::<Build>, help_heading = "Integral")]
+    build: Option<Build>,
 }
 
 impl Integral {
@@ -50,6 +53,7 @@ impl Integral {
             planes: self.planes.unwrap_or(choice.planes),
             per_cell: self.plane_per_cell || choice.per_cell,
             texels: self.texels.unwrap_or(choice.texels),
+            build: self.build.unwrap_or(choice.build),
         }
     }
 }

@@ -86,8 +86,15 @@ struct Row {
     max: f64,
 }
 
-/// The form whose error has a bound.
+/// Forms whose errors have bounds, as have polynomials.
 const UNIFORM: &str = "volume, uniform";
+const NORMALISED: &str = "volume, log-normalised";
+
+/// Logarithmic lengths.
+const OCTAVES: u32 = 16;
+
+const POLYNOMIALS: [(&str, u32); 3] =
+    [("polynomial, degree 1", 1), ("polynomial, degree 2", 2), ("polynomial, degree 4", 4)];
 
 /// Pixels of one picture of the sheet, along both axes, and between two of them.
 const SIDE: usize = 96;
@@ -191,14 +198,23 @@ fn forms<'a>(
 ) -> Vec<Form<'a>> {
     let m = options.entries;
     let mut forms = vec![];
-    let mut add = |name, construction, size: String, build: Build<'a>| {
-        let bound = if name == UNIFORM { table::bound(exact, n, lengths, longest) } else { None };
+    let mut add = |name, construction: &'static str, size: String, build: Build<'a>| {
+        // Few bits cost what they cost besides.
+        let bound = match name {
+            _ if construction.ends_with("bits") => None,
+            UNIFORM => table::bound(exact, n, lengths, longest),
+            NORMALISED => table::bound_of_normalised(exact, n, OCTAVES, longest),
+            _ => POLYNOMIALS
+                .into_iter()
+                .find(|p| p.0 == name)
+                .and_then(|(_, degree)| table::bound_of_polynomial(exact, degree, n, longest)),
+        };
         forms.push(Form { name, construction, size, bound, build });
     };
     for (name, kind, slices) in [
         (UNIFORM, table::Kind::Uniform, lengths),
-        ("volume, log", table::Kind::Log, 16),
-        ("volume, log-normalised", table::Kind::LogNormalised, 16),
+        ("volume, log", table::Kind::Log, OCTAVES),
+        (NORMALISED, table::Kind::LogNormalised, OCTAVES),
     ] {
         let (size, text) = ([n, n, slices], format!("{n}x{n}x{slices}"));
         let sampling = [Sampling::same(m, 1.0), Sampling::touched(m, 2.0)];
@@ -229,7 +245,7 @@ fn forms<'a>(
     let size = format!("{n}x{n}");
     add("linear opacity", "f64", size.clone(), Box::new(move || Ok(Linear::new(exact, n, longest).map(of_linear))));
     add("linear opacity", "closed", size, Box::new(move || Ok(Linear::closed(exact, n, longest).map(of_linear))));
-    for (name, degree) in [("polynomial, degree 1", 1), ("polynomial, degree 2", 2), ("polynomial, degree 4", 4)] {
+    for (name, degree) in POLYNOMIALS {
         let size = format!("{n}x{n}x{}", degree + 1);
         let mut polynomial = |construction, bits: u32, make: Box<dyn Fn() -> Option<Polynomial> + 'a>| {
             let build = move || Ok(make().map(|table| of_polynomial(table, bits)));

@@ -6,7 +6,7 @@ use crate::gpu::raster::{self, Readback};
 use crate::gpu::shader::{self, Variant};
 use crate::gpu::testing::{gpu, validated};
 use crate::integral::choice::{Choice, Form};
-use crate::integral::lookup::tests::{choices, exact, segments, worst};
+use crate::integral::lookup::tests::{choices, exact, segments, transfer, worst};
 use crate::transfer::Emission;
 use wgpu::naga;
 
@@ -29,6 +29,16 @@ fn source(table: &Lookup, direct: bool) -> String {
 
 /// What the device looks up.
 fn looked_up(gpu: &Gpu, table: &Lookup, direct: bool, segments: &[[f32; 3]]) -> Vec<[f32; 4]> {
+    let on_device = OnDevice::holding(gpu, table).unwrap();
+    looked_up_in(gpu, (table, &on_device), direct, segments)
+}
+
+fn looked_up_in(
+    gpu: &Gpu,
+    (table, on_device): (&Lookup, &OnDevice),
+    direct: bool,
+    segments: &[[f32; 3]],
+) -> Vec<[f32; 4]> {
     let own = raster::layout(gpu, wgpu::ShaderStages::COMPUTE, &[Slot::Read, Slot::Write]);
     let tables = raster::layout(gpu, wgpu::ShaderStages::COMPUTE, &SLOTS);
     let module = raster::module(gpu, "test", &source(table, direct));
@@ -38,7 +48,6 @@ fn looked_up(gpu: &Gpu, table: &Lookup, direct: bool, segments: &[[f32; 3]]) -> 
     let size = 16 * cases.len() as u64;
     let cases = Buffer::holding(gpu, "cases", &cases, Usage::STORAGE).unwrap();
     let outcomes = Buffer::new(gpu, "outcomes", size, Usage::STORAGE | Usage::COPY_SRC).unwrap();
-    let on_device = OnDevice::holding(gpu, table).unwrap();
     let own = raster::group(gpu, &own, [&cases, &outcomes].map(|b| b.raw.as_entire_binding()));
     let tables = raster::group(gpu, &tables, on_device.bindings());
     let back = Readback::new(gpu, size).unwrap();
@@ -88,6 +97,47 @@ fn devices_look_up_as_f64_does() {
             }
         }
     }
+}
+
+/// Tables that the device builds are those that it is handed, rows of any length.
+#[test]
+fn devices_look_up_what_they_built() {
+    let Some(gpu) = gpu() else { return };
+    let (segments, mut built) = (segments(5000), 0);
+    if texel_format(&gpu, Texels::Float).is_err() {
+        return;
+    }
+    for emission in [Emission::Chromatic, Emission::Direct { scale: 0.7 }] {
+        let (exact, direct) = (exact(emission), emission != Emission::Chromatic);
+        let narrow = Exact::<f32>::new(
+            &transfer(emission),
+            field::Kind::Scalar,
+            &[field::Normal { mid: 0.0, half: 1.0 }; 4],
+            1.0,
+        );
+        let function = crate::gpu::function::upload(&gpu, &narrow).unwrap();
+        let builder = Builder::new(&gpu, direct).unwrap();
+        let volumes = [Kind::Uniform, Kind::Log, Kind::LogNormalised].map(|lengths| Choice {
+            lengths,
+            table: Some([17, 17, 8]),
+            ..Choice::of(Form::Volume)
+        });
+        for choice in choices().into_iter().filter(|c| c.planes == Planes::Two).chain(volumes) {
+            let table = Lookup::outline(&exact, &choice, 2.0).unwrap();
+            let on_device = OnDevice::building(&gpu, &table, &exact, &builder, &function);
+            let [front, back, _] = table.size();
+            if front != back || choice.degree > 4 {
+                assert!(on_device.unwrap_err().to_string().contains("cannot build"), "{choice:?}");
+                continue;
+            }
+            let got = looked_up_in(&gpu, (&table, &on_device.unwrap()), direct, &segments);
+            let worst = worst(&Lookup::new(&exact, &choice, 2.0).unwrap(), &segments, &got);
+            let bound = if gpu.adapter.kind == "CPU" { 1e-4 } else { 5e-3 };
+            assert!(worst < bound, "{choice:?}, {emission:?}: {worst}");
+            built += 1;
+        }
+    }
+    assert!(built > 6, "{built}");
 }
 
 #[test]

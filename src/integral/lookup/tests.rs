@@ -7,11 +7,14 @@ use crate::transfer::{Emission, TransferFunction};
 const UNIT: [Normal; 4] = [Normal { mid: 0.0, half: 1.0 }; 4];
 
 /// Ramps and a peak.
-pub(crate) fn exact(emission: Emission) -> Exact<f64> {
+pub(crate) fn transfer(emission: Emission) -> TransferFunction {
     let color = vec![(-1.0, [1.0, 0.2, 0.0]), (0.3, [0.0, 0.5, 0.9]), (1.0, [0.4, 0.4, 0.4])];
     let opacity = vec![(-1.0, 0.1), (0.0, 0.3), (0.2, 3.0), (0.4, 0.2), (1.0, 1.5)];
-    let transfer = TransferFunction::new(color, opacity, 1.0).unwrap().with_emission(emission).unwrap();
-    Exact::new(&transfer, field::Kind::Scalar, &UNIT, 1.0)
+    TransferFunction::new(color, opacity, 1.0).unwrap().with_emission(emission).unwrap()
+}
+
+pub(crate) fn exact(emission: Emission) -> Exact<f64> {
+    Exact::new(&transfer(emission), field::Kind::Scalar, &UNIT, 1.0)
 }
 
 /// Every form and variant, small.

@@ -1,10 +1,11 @@
 //! The separated table (Guthe, Röttger, Schieber, Straßer & Ertl 2002, section 3).
 //!
-//! Opacity needs two parameters only: with the mean extinction ρ̂(s_f, s_b) = ∫₀¹ ρ(s_f + t (s_b − s_f)) dt it is
-//! α = 1 − e^{−l ρ̂}. The colour over α hardly depends on the length: it is a polynomial of degree n in l/l_max, through its
-//! values at l = (i/n) l_max, the first of which is its limit. So n + 1 tables of two parameters stand for one of three.
+//! Opacity needs two parameters only: with the mean extinction ρ̂(s_f, s_b) = ∫₀¹ ρ(s_f + t (s_b − s_f)) dt it is α = 1
+//! − e^{−l ρ̂}. The colour over α hardly depends on the length: it is a polynomial of degree n in l/l_max, through its
+//! values at l = (i/n) l_max, the first of which is its limit. So n + 1 tables of two parameters stand for one of
+//! three.
 
-use super::closed::{self, Lanes, Rows};
+use super::closed::{self, Both, Runs};
 use super::grid::Grid;
 use super::volume::{OPAQUE_DEPTH, Pieces, normalised};
 use super::{between, is_scalar, reconstructed, value};
@@ -29,16 +30,36 @@ pub struct Polynomial {
 /// The share of the longest length at which a mean extinction may be opaque: cells of one mesh differ much in size.
 pub(crate) const THINNEST: f64 = 1.0 / 16384.0;
 
-/// Rows of the sheared table that are built before they are written.
-const BAND: usize = 64;
+/// Segments of neighbouring distances that are integrated before they are written: as many as the cache holds.
+const BAND: usize = 1 << 14;
+
+/// Coefficients of the polynomials through a limit and points; with the first, the mean extinction.
+#[inline(always)]
+fn coefficients<const L: usize, const P: usize>(
+    weights: &[[f32; P]; P],
+    limit: [f32; 4],
+    points: &[[f32; 4]; L],
+) -> [[f32; 4]; P] {
+    let mut all = [[0.0; 4]; P];
+    for (c, (of, weights)) in all.iter_mut().zip(weights).enumerate() {
+        *of = limit.map(|v| v * weights[0]);
+        for (point, weight) in points.iter().zip(&weights[1..]) {
+            for k in 0..4 {
+                of[k] += point[k] * weight;
+            }
+        }
+        of[3] = if c == 0 { limit[3] } else { 0.0 };
+    }
+    all
+}
 
 /// A sum of powers that goes through points at 0, 1/n, …, 1: the rows give its coefficients from the values there.
 pub(crate) type Inverse = Vec<Vec<f64>>;
 
 impl Polynomial {
-    /// Integrates `exact` over segments of up to `longest` normalised units, on the current rayon pool. `None` for fields of
-    /// several components, less than 2 texels along an axis, and degrees that are not 1 to 8: points at equal distances give no
-    /// better ones.
+    /// Integrates `exact` over segments of up to `longest` normalised units, on the current rayon pool. `None` for
+    /// fields of several components, less than 2 texels along an axis, and degrees that are not 1 to 8: points at equal
+    /// distances give no better ones.
     pub fn new(exact: &Exact<f64>, degree: u32, size: u32, longest: f64) -> Option<Self> {
         if !is_scalar(exact) || size < 2 || !(1..=8).contains(&degree) {
             return None;
@@ -65,7 +86,8 @@ impl Polynomial {
         Some(Polynomial { degree, size, longest, direct: exact.direct, texels })
     }
 
-    /// The same table, to f32, in a time per texel that does not depend on the function (`closed.rs` says how), up to degree 4.
+    /// The same table, to f32, in a time per texel that does not depend on the function (`closed.rs` says how), up to
+    /// degree 4.
     pub fn closed(exact: &Exact<f64>, degree: u32, size: u32, longest: f64) -> Option<Self> {
         // Of higher degrees, coefficients are great sums of both signs, which f32 does not hold.
         if size < 3 || degree > 4 {
@@ -80,7 +102,8 @@ impl Polynomial {
         Some(table)
     }
 
-    /// This table of another function, in the memory that it has: faster than [`Polynomial::closed`], as that is then known to be there.
+    /// This table of another function, in the memory that it has: faster than [`Polynomial::closed`], as that is then
+    /// known to be there.
     pub fn rebuild(&mut self, exact: &Exact<f64>) {
         if is_scalar(exact) && self.size > 2 && self.degree <= 4 {
             self.direct = exact.direct;
@@ -113,41 +136,32 @@ impl Polynomial {
         for of in &mut self.texels {
             of.chunks_exact_mut(n).zip(&mut by_row).for_each(|(row, rows)| rows.push(row));
         }
-        // Colours at the points, and with the first the mean extinction: some rows of the sheared table at a time, so that they stay in
-        // the cache, each written by one thread and read by another.
-        let mut sheared = vec![[[0.0f32; 4]; P]; n * BAND.min(n)];
-        for first in (0..n).step_by(BAND) {
-            let count = BAND.min(n - first);
-            sheared[..n * count].par_chunks_mut(n).enumerate().for_each_init(
-                || (Rows::new(grid, lengths), vec![Lanes([[0.0; L]; 4]); n]),
-                |(rows, row), (r, sheared)| {
-                    let r = first + r;
-                    rows.row(r, row);
-                    for (i, (lanes, points)) in row.iter_mut().zip(sheared).enumerate() {
-                        let j = closed::behind(i, r, n);
-                        closed::normalise(grid, [i, j], lanes, &lengths, most);
-                        let Lanes([red, green, blue, density]) = lanes;
-                        let [r, g, b] = grid.limit(i, j).map(|c| c as f32);
-                        points[0] = [r, g, b, density[0]];
-                        for l in 0..L {
-                            points[l + 1] = [red[l], green[l], blue[l], 0.0];
-                        }
+        // Coefficients of a rising scalar and of a falling one: of some distances at a time, so that they stay in the
+        // cache, each written by one thread and read by another.
+        let runs = Runs::new(grid, lengths);
+        let band = (BAND / n).clamp(1, n);
+        // Not as many as a power of 2, as then all distances of a texel would have one place in the cache.
+        let stride = n + 3;
+        let mut sheared = vec![[[[0.0f32; 4]; P]; 2]; stride * band];
+        for first in (0..n).step_by(band) {
+            let count = band.min(n - first);
+            sheared[..stride * count].par_chunks_mut(stride).enumerate().for_each_init(
+                || (runs.scratch(), vec![Both::NOTHING; n]),
+                |(scratch, segments), (d, sheared)| {
+                    let d = first + d;
+                    runs.apart(d, scratch, &mut segments[..n - d]);
+                    for (i, (both, of)) in segments[..n - d].iter_mut().zip(sheared).enumerate() {
+                        let limit = closed::normalise(grid, [i, i + d], both, most);
+                        *of = [&both.rising, &both.falling].map(|lanes| coefficients(&weights, limit, &lanes.0));
                     }
                 },
             );
             by_row.par_iter_mut().enumerate().for_each(|(j, rows)| {
-                for r in 0..count {
-                    let i = if j >= first + r { j - first - r } else { j + n - first - r };
-                    let points = &sheared[r * n + i];
-                    for (c, (row, weights)) in rows.iter_mut().zip(&weights).enumerate() {
-                        let mut sum = [0.0; 4];
-                        for (weight, point) in weights.iter().zip(points) {
-                            for k in 0..4 {
-                                sum[k] += weight * point[k];
-                            }
-                        }
-                        sum[3] = if c == 0 { points[0][3] } else { 0.0 };
-                        row[i] = sum;
+                for (c, row) in rows.iter_mut().enumerate() {
+                    let falling = sheared[j..].iter().step_by(stride).map(|of| of[1][c]);
+                    row[j..].iter_mut().skip(first).zip(falling.take(count)).for_each(|(to, texel)| *to = texel);
+                    for d in first..(first + count).min(j + 1) {
+                        row[j - d] = sheared[(d - first) * stride + j - d][0][c];
                     }
                 }
             });
@@ -169,8 +183,9 @@ impl Polynomial {
         reconstructed(color, sums[0][3], l, self.direct)
     }
 
-    /// The greatest of each coefficient's channels, by which it is divided where texels are in [−1, 1]: one scale for the colours of
-    /// all powers would leave the higher ones few levels, so each has its own; with it, that of the mean extinction (which is in [0, 1]).
+    /// The greatest of each coefficient's channels, by which it is divided where texels are in [−1, 1]: one scale for
+    /// the colours of all powers would leave the higher ones few levels, so each has its own; with it, that of the mean
+    /// extinction (which is in [0, 1]).
     pub fn scales(&self) -> Vec<[f32; 2]> {
         let most = |t: &Vec<[f32; 4]>| {
             t.iter()
@@ -179,7 +194,8 @@ impl Polynomial {
         self.texels.iter().map(most).collect()
     }
 
-    /// The same table as texels of `bits` bits hold it, scaled to their range: two's complement for coefficients, as they have a sign.
+    /// The same table as texels of `bits` bits hold it, scaled to their range: two's complement for coefficients, as
+    /// they have a sign.
     pub fn rounded(&self, bits: u32) -> Self {
         let levels = (2f32).powi(bits as i32) - 1.0;
         let half = ((2f32).powi(bits as i32 - 1) - 1.0).max(1.0);

@@ -7,7 +7,7 @@
 //! are. What hardly depends on the length has no such bias: [`Kind::LogNormalised`] keeps the mean extinction ρ̂ = −ln(1−α)/l
 //! and the colour C/α, so that α = 1 − e^{−l ρ̂}.
 
-use super::closed::{self, Lanes, Rows};
+use super::closed::{self, Both, Runs};
 use super::grid::Grid;
 use super::{between, is_scalar, light, published, reconstructed, value};
 use crate::integral::{Exact, Light};
@@ -43,9 +43,9 @@ pub struct Table {
     pub texels: Vec<[f32; 4]>,
 }
 
-/// Lengths that are integrated side by side, and rows of the sheared table that are written at a time.
+/// Lengths that are integrated side by side, and distances of values of which texels are written at a time.
 const LANES: usize = 8;
-const ROWS: usize = 8;
+const DISTANCES: usize = 8;
 
 /// Optical depths beyond this are opaque, and so is a mean extinction that gives it to the thinnest slice but 0.
 pub(crate) const OPAQUE_DEPTH: f64 = 100.0;
@@ -112,29 +112,30 @@ impl Table {
         let most = (OPAQUE_DEPTH / length(1)) as f32;
         let fill = |(group, texels): (usize, &mut [[f32; 4]])| {
             let lengths: [f32; LANES] = std::array::from_fn(|l| length((group * LANES + l) as u32) as f32);
-            let mut rows = Rows::new(grid, lengths);
-            let mut sheared = vec![Lanes::NOTHING; ROWS * n];
+            let runs = Runs::new(grid, lengths);
+            let (mut scratch, mut segments) = (runs.scratch(), vec![Both::NOTHING; DISTANCES * n]);
             let mut slices: Vec<_> = texels.chunks_exact_mut(n * n).collect();
-            for first in (0..n).step_by(ROWS) {
-                let count = ROWS.min(n - first);
-                for (r, row) in (first..first + count).zip(sheared.chunks_exact_mut(n)) {
-                    rows.row(r, row);
+            for first in (0..n).step_by(DISTANCES) {
+                let count = DISTANCES.min(n - first);
+                for (d, row) in (first..first + count).zip(segments.chunks_exact_mut(n)) {
+                    runs.apart(d, &mut scratch, &mut row[..n - d]);
                     if normalised {
-                        for (i, lanes) in row.iter_mut().enumerate() {
-                            closed::normalise(grid, [i, closed::behind(i, r, n)], lanes, &lengths, most);
+                        for (i, both) in row[..n - d].iter_mut().enumerate() {
+                            closed::normalise(grid, [i, i + d], both, most);
                         }
-                    } else {
-                        closed::publish(row);
                     }
                 }
-                // Several rows at a time, as then texels that are written one after another are neighbours.
+                // Several distances at a time, as then texels that are written one after another are neighbours.
                 for j in 0..n {
-                    for r in 0..count {
-                        let i = if j >= first + r { j - first - r } else { j + n - first - r };
-                        let Lanes([red, green, blue, last]) = &sheared[r * n + i];
-                        for (l, slice) in slices.iter_mut().enumerate() {
-                            slice[j * n + i] = [red[l], green[l], blue[l], last[l]];
-                        }
+                    for d in first..(first + count).min(n - j) {
+                        let at = j * n + j + d;
+                        let texels = &segments[(d - first) * n + j].falling.0;
+                        slices.iter_mut().zip(texels).for_each(|(slice, texel)| slice[at] = *texel);
+                    }
+                    for d in first..(first + count).min(j + 1) {
+                        let at = j * n + j - d;
+                        let texels = &segments[(d - first) * n + j - d].rising.0;
+                        slices.iter_mut().zip(texels).for_each(|(slice, texel)| slice[at] = *texel);
                     }
                 }
             }
