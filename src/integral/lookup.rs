@@ -2,10 +2,9 @@
 
 use super::choice::{Alpha, Choice, Form, Planes, Texels};
 use super::table::{Cylindrical, Kind, Polynomial, Table, length};
-use super::{Exact, Light, table};
+use super::{Exact, Light, opacity_of_depth, table};
 use crate::error::{Error, Result};
 use crate::field;
-use crate::real::Real;
 
 /// What bounds the error of a uniform volume whose size nobody said, where a table of 256 x 256 x 128 can hold that. It is the worst
 /// case, some 20 times what is seen.
@@ -333,15 +332,6 @@ fn bilinear(texels: &[[f32; 4]], width: u32, (i, u): (usize, f32), (j, v): (usiz
         mix(texels[at], texels[at + 1], u)
     };
     mix(row(j), row(j + 1), v)
-}
-
-/// 1 − e^{−depth}, accurate relative to itself.
-#[inline(always)]
-fn opacity_of_depth(d: f32) -> f32 {
-    if d < 0.25 {
-        return d * (1.0 - d / 2.0 * (1.0 - d / 3.0 * (1.0 - d / 4.0 * (1.0 - d / 5.0 * (1.0 - d / 6.0)))));
-    }
-    1.0 - Real::exp(-d)
 }
 
 #[cfg(test)]

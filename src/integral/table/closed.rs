@@ -11,7 +11,7 @@
 //! it.
 
 use super::grid::{Grid, Part};
-use crate::integral::{GAUSS_3, GAUSS_6, PANEL, Piece, SHALLOW};
+use crate::integral::{GAUSS_6, MILD, PANEL, Piece};
 use crate::real::Real;
 
 /// Premultiplied colour and opacity (or what stands for both) of segments of several lengths.
@@ -83,12 +83,6 @@ struct Weights {
     falling: [[f32; AT_ONCE]; 2],
 }
 
-/// (1 − e^{−t})/t for t up to [`SHALLOW`], to f32.
-#[inline(always)]
-fn slope_of_opacity(t: f32) -> f32 {
-    1.0 - t * (1.0 / 2.0 - t * (1.0 / 6.0 - t * (1.0 / 24.0 - t * (1.0 / 120.0 - t * (1.0 / 720.0)))))
-}
-
 impl Weights {
     const EMPTY: Self = Weights {
         x: [0.0; AT_ONCE],
@@ -98,21 +92,29 @@ impl Weights {
         falling: [[0.0; AT_ONCE]; 2],
     };
 
-    /// As [`Piece::new`], both ways, for depths that `rule` is for. Takes no decisions and a node at a time, so that it
-    /// becomes vector instructions.
+    /// As [`Piece::new`], both ways, for depths up to [`MILD`]. This and the next take no decisions, so that they become vector
+    /// instructions.
     #[inline(always)]
-    fn integrate<const N: usize, const SHALLOW: bool, const DIRECT: bool>(&mut self, rule: &[[f64; 2]; N]) {
+    fn expand<const DIRECT: bool>(&mut self) {
+        for q in 0..AT_ONCE {
+            let (x, y) = (self.x[q], self.y[q]);
+            self.set(q, Piece::mild(x, y, DIRECT), Piece::mild(y, x, DIRECT));
+        }
+    }
+
+    /// The same for depths up to [`PANEL`], a node at a time.
+    #[inline(always)]
+    fn integrate<const DIRECT: bool>(&mut self) {
         let Weights { x, y, alpha, rising: [rising_front, rising_back], falling: [falling_front, falling_back] } = self;
         for of in [&mut *alpha, rising_front, rising_back, falling_front, falling_back] {
             of.fill(0.0);
         }
-        let fade = |t: f32| if SHALLOW { 1.0 - t * slope_of_opacity(t) } else { Real::exp(-t) };
-        for [u, weight] in rule {
-            let (u, weight) = (*u as f32, *weight as f32);
+        for [u, weight] in GAUSS_6 {
+            let (u, weight) = (u as f32, weight as f32);
             for q in 0..AT_ONCE {
                 let rise = (y[q] - x[q]) * u;
                 let (slope, depth) = (x[q] + rise, (x[q] + rise * 0.5) * u);
-                let (rising, falling) = (fade(depth) * weight, fade((x[q] + y[q]) * 0.5 - depth) * weight);
+                let [rising, falling] = [depth, (x[q] + y[q]) * 0.5 - depth].map(|t| weight * <f32 as Real>::exp(-t));
                 let absorbed = slope * rising;
                 let [rising, falling] = if DIRECT { [rising, falling] } else { [absorbed, slope * falling] };
                 alpha[q] += absorbed;
@@ -124,26 +126,11 @@ impl Weights {
         }
     }
 
-    /// The same for depths up to [`SHALLOW`], of chromatic emission, by the series of β in the mean depth D and the
-    /// rise δ = y − x. With T(u) = D u − ½ δ (u − u²) it is β = Ψ − e^{−D}, and the term of δᵏ Dᵐ in Ψ is (−1)ᵐ (m +
-    /// k)! / (2ᵏ m! (m + 2k + 1)!). Falling, δ has the other sign.
     #[inline(always)]
-    fn expand(&mut self) {
-        for q in 0..AT_ONCE {
-            let (d, rise) = ((self.x[q] + self.y[q]) * 0.5, self.y[q] - self.x[q]);
-            let even = d
-                * (1.0 / 2.0
-                    - d * (1.0 / 3.0 - d * (1.0 / 8.0 - d * (1.0 / 30.0 - d * (1.0 / 144.0 - d * (1.0 / 840.0))))));
-            let once = 1.0 / 12.0 - d * (1.0 / 24.0 - d * (1.0 / 80.0 - d * (1.0 / 360.0 - d * (1.0 / 2016.0))));
-            let twice = 1.0 / 240.0 - d * (1.0 / 480.0 - d * (1.0 / 1680.0 - d * (1.0 / 8064.0)));
-            let thrice = 1.0 / 6720.0 - d * (1.0 / 13_440.0);
-            let square = rise * rise;
-            let (even, odd) = (even + square * twice, rise * (once + square * thrice));
-            let (alpha, back, front) = (d * slope_of_opacity(d), even + odd, even - odd);
-            self.alpha[q] = alpha;
-            (self.rising[0][q], self.rising[1][q]) = (alpha - back, back);
-            (self.falling[0][q], self.falling[1][q]) = (front, alpha - front);
-        }
+    fn set(&mut self, q: usize, rising: Piece<f32>, falling: Piece<f32>) {
+        self.alpha[q] = rising.alpha;
+        (self.rising[0][q], self.rising[1][q]) = (rising.front, rising.back);
+        (self.falling[0][q], self.falling[1][q]) = (falling.back, falling.front);
     }
 
     /// The same for any depths.
@@ -152,22 +139,16 @@ impl Weights {
             // Squares must be finite, however long a segment of what is opaque.
             let (x, y) = (self.x[q].min(1e18), self.y[q].min(1e18));
             if x.max(y) > PANEL as f32 {
-                let [rising, falling] = [Piece::new(x, y, direct), Piece::new(y, x, direct)];
-                self.alpha[q] = rising.alpha;
-                (self.rising[0][q], self.rising[1][q]) = (rising.front, rising.back);
-                (self.falling[0][q], self.falling[1][q]) = (falling.back, falling.front);
+                self.set(q, Piece::new(x, y, direct), Piece::new(y, x, direct));
             }
         }
     }
 
     #[inline(always)]
     fn all<const DIRECT: bool>(&mut self, steepest: f32) {
-        if steepest <= SHALLOW as f32 && !DIRECT {
-            self.expand();
-        } else if steepest <= SHALLOW as f32 {
-            self.integrate::<3, true, DIRECT>(&GAUSS_3);
-        } else {
-            self.integrate::<6, false, DIRECT>(&GAUSS_6);
+        match steepest <= MILD as f32 {
+            true => self.expand::<DIRECT>(),
+            false => self.integrate::<DIRECT>(),
         }
         if steepest > PANEL as f32 {
             self.integrate_deep(DIRECT);
@@ -287,12 +268,6 @@ impl<'a, const L: usize> Runs<'a, L> {
             }
         }
     }
-}
-
-/// 1 − e^{−depth}, accurate relative to itself.
-#[inline(always)]
-pub(super) fn opacity(depth: f32) -> f32 {
-    if depth < SHALLOW as f32 { depth * slope_of_opacity(depth) } else { 1.0 - Real::exp(-depth) }
 }
 
 /// Opacities below this have no colour over them but the limit.

@@ -4,8 +4,9 @@
 //! as the segment touches.
 
 use super::volume::{Kind, Table, length};
-use super::{closed, grid, is_scalar, value};
+use super::{grid, is_scalar, value};
 use crate::integral::Exact;
+use crate::integral::opacity_of_depth;
 use crate::real::Real;
 use rayon::prelude::*;
 
@@ -114,7 +115,7 @@ fn texel_of(list: &[[f32; 4]], [front, back]: [f32; 2], l: f32, count: u32, dire
     let (mut sum, mut through) = ([0.0; 3], 1.0);
     for i in 0..count {
         let [r, g, b, tau] = entry(list, at + rise * i as f32);
-        let alpha = closed::opacity(tau * step);
+        let alpha = opacity_of_depth(tau * step);
         let seen = match direct {
             false => alpha,
             true if tau * step > 1e-6 => alpha / tau,
