@@ -36,15 +36,21 @@ pub(super) struct Built {
 pub(super) struct Tables {
     ready: Option<(Arc<Key>, Built)>,
     building: Option<(Arc<Key>, Receiver<Result<Built>>)>,
+    /// The last one, whose memory the next takes.
+    spare: Option<Arc<Lookup>>,
     /// Not the renderer's: frames would wait behind the table's work.
     pool: Option<rayon::ThreadPool>,
 }
 
 impl Key {
-    fn build(&self) -> Result<Built> {
+    fn build(&self, spare: Option<Arc<Lookup>>) -> Result<Built> {
         let start = Instant::now();
-        let make = if self.on_device { Lookup::outline } else { Lookup::new };
-        let table = make(&self.exact, &self.choice, self.longest)?;
+        let Key { exact, choice, longest, .. } = self;
+        let table = match spare.and_then(Arc::into_inner) {
+            _ if self.on_device => Lookup::outline(exact, choice, *longest),
+            Some(old) => Lookup::renewed(old, exact, choice, *longest),
+            None => Lookup::new(exact, choice, *longest),
+        }?;
         Ok(Built { table: Arc::new(table), ms: start.elapsed().as_secs_f64() * 1e3 })
     }
 }
@@ -62,9 +68,12 @@ impl Tables {
         {
             return Ok(Some(built.clone()));
         }
-        self.ready = None;
+        if let Some((_, old)) = self.ready.take() {
+            self.spare = Some(old.table);
+        }
         if wait {
-            let built = own.install(|| key.build())?;
+            let spare = self.spare.take();
+            let built = own.install(|| key.build(spare))?;
             self.ready = Some((Arc::clone(key), built.clone()));
             return Ok(Some(built));
         }
@@ -82,14 +91,14 @@ impl Tables {
             return Ok(());
         }
         if key.on_device {
-            self.ready = Some((Arc::clone(key), key.build()?));
+            self.ready = Some((Arc::clone(key), key.build(self.spare.take())?));
             return Ok(());
         }
         let (sender, receiver) = channel();
-        let own_key = Arc::clone(key);
+        let (own_key, spare) = (Arc::clone(key), self.spare.take());
         self.pool(own)?.spawn(move || {
             // A renderer that is gone wants no table.
-            let _ = sender.send(own_key.build());
+            let _ = sender.send(own_key.build(spare));
         });
         self.building = Some((Arc::clone(key), receiver));
         Ok(())

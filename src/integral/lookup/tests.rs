@@ -17,6 +17,21 @@ pub(crate) fn exact(emission: Emission) -> Exact<f64> {
     Exact::new(&transfer(emission), field::Kind::Scalar, &UNIT, 1.0)
 }
 
+/// A table in the memory of another function's is the same, and so is one that does not fit there.
+#[test]
+fn tables_are_renewed() {
+    let [one, other] = [Emission::Chromatic, Emission::Direct { scale: 0.7 }].map(exact);
+    for choice in choices() {
+        for texels in [Texels::Float, Texels::Unorm8] {
+            let choice = Choice { texels, ..choice };
+            for longest in [2.0, 1.5] {
+                let (old, want) = (Lookup::new(&one, &choice, 2.0).unwrap(), Lookup::new(&other, &choice, longest));
+                assert!(Lookup::renewed(old, &other, &choice, longest).unwrap() == want.unwrap(), "{choice:?}");
+            }
+        }
+    }
+}
+
 /// Every form and variant, small.
 pub(crate) fn choices() -> Vec<Choice> {
     let mut all = vec![];
