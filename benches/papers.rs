@@ -1,10 +1,11 @@
 //! The tables of the papers, made again: `cargo bench --bench papers` prints them beside what the papers report, and
-//! `cargo bench --bench papers -- bits`, `sizes`, `polynomials` or `targets` one part. What would take more than a minute, going by what the
-//! same took for a smaller table, is left out, and that is said.
+//! `cargo bench --bench papers -- bits`, `sizes`, `polynomials` or `targets` one part. What would take more than a
+//! minute, going by what the same took for a smaller table, is left out, and that is said.
 //!
-//! Numbers of the papers are those of their machines of 2002: Röttger & Ertl, "A Two-Step Approach for Interactive Pre-Integrated Volume
-//! Rendering of Unstructured Grids", and Guthe, Röttger, Schieber, Straßer & Ertl, "High-Quality Unstructured Volume Rendering on the
-//! PC Platform". Their functions are not published: these are bands and random entries like those that they draw.
+//! Numbers of the papers are those of their machines of 2002: Röttger & Ertl, "A Two-Step Approach for Interactive
+//! Pre-Integrated Volume Rendering of Unstructured Grids", and Guthe, Röttger, Schieber, Straßer & Ertl, "High-Quality
+//! Unstructured Volume Rendering on the PC Platform". Their functions are not published: these are bands and random
+//! entries like those that they draw.
 
 #![allow(clippy::expect_used, clippy::print_stdout, reason = "a benchmark that cannot start has nothing to tell")]
 
@@ -293,7 +294,8 @@ fn targets() {
     }
 }
 
-/// The root mean square error of some thousand texels of polynomials against adaptive integration, at the lengths of their points.
+/// The root mean square error of some thousand texels of polynomials against adaptive integration, at the lengths of
+/// their points.
 fn judged_polynomial(transfer: &TransferFunction, table: &Polynomial) -> f64 {
     let (n, degree) = (table.size, table.degree);
     let sum: f64 = (0..2000u32)

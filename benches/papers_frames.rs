@@ -1,5 +1,6 @@
-//! Frame rates that the papers on pre-integrated tables report, measured again: `cargo bench --bench papers_frames`; with `tiles` or
-//! `sorts` after that, one of them. Graphics cards of 2002 and whatever draws here are no match; what one form takes beside another is.
+//! Frame rates that the papers on pre-integrated tables report, measured again: `cargo bench --bench papers_frames`;
+//! with `tiles` or `sorts` after that, one of them. Graphics cards of 2002 and whatever draws here are no match; what
+//! one form takes beside another is.
 
 #![allow(
     clippy::expect_used,
@@ -63,8 +64,8 @@ fn around(middle: DVec3, radius: f64, step: f64) -> Camera {
     }
 }
 
-/// A ball of 2,560 tetrahedra: a sphere of 160 triangles, over its centre and in five layers of wedges. The scalar is the
-/// distance from the centre.
+/// A ball of 2,560 tetrahedra: a sphere of 160 triangles, over its centre and in five layers of wedges. The scalar is
+/// the distance from the centre.
 fn distance_ball() -> Mesh {
     const ACROSS: usize = 16;
     const DOWN: usize = 6;

@@ -1,4 +1,5 @@
-//! Each stage of the pipeline by itself: `cargo bench`, or `cargo bench -- faces` for one. `halite bench` measures whole frames of real meshes.
+//! Each stage of the pipeline by itself: `cargo bench`, or `cargo bench -- faces` for one. `halite bench` measures
+//! whole frames of real meshes.
 
 #![allow(clippy::expect_used, reason = "a benchmark that cannot start has nothing to tell")]
 

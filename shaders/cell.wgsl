@@ -1,6 +1,7 @@
 // A ray and a tetrahedron: the f32 twin of src/cell.rs, which says why this never gets lost.
 
-/// A place or direction as the sum of two vectors: one float tells places to 1e-7 only, and a steep transfer function shows that.
+/// A place or direction as the sum of two vectors: one float tells places to 1e-7 only, and a steep transfer function
+/// shows that.
 struct Twice {
     high: vec3f,
     low: vec3f,
@@ -23,8 +24,8 @@ struct Ray {
     up: vec3f,
 }
 
-/// The face that a ray passes through: three projected corners, counter-clockwise around the origin, and twice the areas
-/// of the triangles (origin, next corner, last corner).
+/// The face that a ray passes through: three projected corners, counter-clockwise around the origin, and twice the
+/// areas of the triangles (origin, next corner, last corner).
 struct Face {
     a: vec4f,
     b: vec4f,
@@ -78,10 +79,10 @@ fn ray_along(origin: Twice, direction: Twice) -> Ray {
     return Ray(origin, Twice(high, low), size, n, right, up);
 }
 
-/// `p` in the coordinates of the ray: two across it, and the two parts of one along it. What lies along the ray is taken off
-/// before the axes across it are asked, so that the places across it are as accurate as they are small. Every fma is written
-/// out, so that a point gets the same bits for each of its cells; tiny coordinates become 0, so that no product of two
-/// underflows.
+/// `p` in the coordinates of the ray: two across it, and the two parts of one along it. What lies along the ray is
+/// taken off before the axes across it are asked, so that the places across it are as accurate as they are small. Every
+/// fma is written out, so that a point gets the same bits for each of its cells; tiny coordinates become 0, so that no
+/// product of two underflows.
 fn project(ray: Ray, p: Twice) -> vec4f {
     let q = sum(p.high, -ray.origin.high);
     let t = shortened(vec3f(dot_fma(q.high, ray.along) / ray.length));
@@ -97,8 +98,8 @@ fn dot_fma(a: vec3f, b: vec3f) -> f32 {
     return fma(a.x, b.x, fma(a.y, b.y, a.z * b.z));
 }
 
-/// Twice the area of the triangle (origin, a, b): positive if it turns counter-clockwise. Products are taken with what their
-/// rounding leaves (Dekker 1971), as faces seen edge-on are nothing but that.
+/// Twice the area of the triangle (origin, a, b): positive if it turns counter-clockwise. Products are taken with what
+/// their rounding leaves (Dekker 1971), as faces seen edge-on are nothing but that.
 fn area(a: vec4f, b: vec4f) -> f32 {
     let c = b.yx;
     let p = a.xy * c;
@@ -114,8 +115,8 @@ fn shortened_pair(v: vec2f) -> vec2f {
     return bitcast<vec2f>(bitcast<vec2u>(v) & vec2u(0xfffff000u));
 }
 
-/// Whether the origin lies to the left of the line from `a` to `b`, whose area is `twice`. Exact, and never the same for
-/// (b, a) unless the two coincide.
+/// Whether the origin lies to the left of the line from `a` to `b`, whose area is `twice`. Exact, and never the same
+/// for (b, a) unless the two coincide.
 fn is_left(a: vec4f, b: vec4f, twice: f32) -> bool {
     if abs(twice) > DOUBT * (abs(a.x * b.y) + abs(a.y * b.x)) {
         return twice > 0.0;
@@ -201,8 +202,8 @@ fn weights_of(areas: vec3f) -> vec3f {
     return select(vec3f(1.0, 0.0, 0.0), areas / sum, sum > 0.0);
 }
 
-/// Where along the ray the point of the face with these weights is, in two parts: differences of such are as accurate as
-/// they are small.
+/// Where along the ray the point of the face with these weights is, in two parts: differences of such are as accurate
+/// as they are small.
 fn depth_of(face: Face, weights: vec3f) -> vec2f {
     let b = depth_between(face.a.zw, face.b.zw);
     let c = depth_between(face.a.zw, face.c.zw);
@@ -214,17 +215,18 @@ fn depth_between(a: vec2f, b: vec2f) -> f32 {
     return (b.x - a.x) + (b.y - a.y);
 }
 
-/// The faces of a tetrahedron for all rays of a picture: for each, how much nearer than the middle it is met, in a pixel from which
-/// places count, and how that rises from pixel to pixel to the right and down. In a perspective view "nearer by x" is the depth
-/// d / (1 + x), d being that of the middle: reciprocals of depths are linear on the screen (Kraus, Qiao & Ebert 2004, section 2.1).
+/// The faces of a tetrahedron for all rays of a picture: for each, how much nearer than the middle it is met, in a
+/// pixel from which places count, and how that rises from pixel to pixel to the right and down. In a perspective view
+/// "nearer by x" is the depth d / (1 + x), d being that of the middle: reciprocals of depths are linear on the screen
+/// (Kraus, Qiao & Ebert 2004, section 2.1).
 struct Facets {
     at: vec4f,
     right: vec4f,
     down: vec4f,
 }
 
-/// Where the ray of the pixel `offset` away enters and leaves, within `limits`, as nearnesses; it misses if the first is not greater.
-/// Which faces are entered is the same for all rays that meet the tetrahedron.
+/// Where the ray of the pixel `offset` away enters and leaves, within `limits`, as nearnesses; it misses if the first
+/// is not greater. Which faces are entered is the same for all rays that meet the tetrahedron.
 fn crossing(facets: Facets, entered: vec4<bool>, offset: vec2f, limits: vec2f) -> vec2f {
     let nearness = fma(facets.down, vec4f(offset.y), fma(facets.right, vec4f(offset.x), facets.at));
     let first = select(vec4f(limits.x), nearness, entered);

@@ -8,8 +8,8 @@ struct Part {
     share: f32,
 }
 
-/// What is known at a value: integrals up to it of extinction, and of colour times extinction (direct: of emission), as sums of
-/// three; extinction and colour of a segment that has this value all along; the colour.
+/// What is known at a value: integrals up to it of extinction, and of colour times extinction (direct: of emission), as
+/// sums of three; extinction and colour of a segment that has this value all along; the colour.
 struct Node {
     high: vec4f,
     middle: vec4f,
@@ -168,7 +168,8 @@ fn runs(slice: u32, d: u32, rising: bool) {
     }
 }
 
-/// Closed form: a row of the sheared table, that is the texels whose value behind is as many texels on from that in front.
+/// Closed form: a row of the sheared table, that is the texels whose value behind is as many texels on from that in
+/// front.
 @compute @workgroup_size(64)
 fn closed(@builtin(global_invocation_id) id: vec3u) {
     let n = job.size;

@@ -1,6 +1,7 @@
 // The ray-segment integral: the f32 twin of src/integral.rs, which explains it.
 
-/// A knot of the transfer function: extinction and colour from it on, how they rise up to the next knot, and where both are.
+/// A knot of the transfer function: extinction and colour from it on, how they rise up to the next knot, and where both
+/// are.
 struct Knot {
     value: vec4f,
     slope: vec4f,
@@ -19,7 +20,8 @@ struct Function {
 
 @group(0) @binding(0) var<uniform> function: Function;
 @group(0) @binding(1) var<storage, read> knots: array<Knot>;
-/// For each of BUCKETS equal parts of [−1, 1], the interval that its lower end lies in; first for opacity, then for colour.
+/// For each of BUCKETS equal parts of [−1, 1], the interval that its lower end lies in; first for opacity, then for
+/// colour.
 @group(0) @binding(2) var<storage, read> buckets: array<u32>;
 
 /// One linear value along a segment, and the interval of its function that it is in.
@@ -54,8 +56,8 @@ fn opacity_of_depth(d: f32) -> f32 {
     return 1.0 - exponential(-d);
 }
 
-/// Opacity of a piece of optical depths `x` and `y` up to MILD, and the weights of its emission, both ends together and the back alone:
-/// see `Piece::mild` in src/integral.rs.
+/// Opacity of a piece of optical depths `x` and `y` up to MILD, and the weights of its emission, both ends together and
+/// the back alone: see `Piece::mild` in src/integral.rs.
 fn mild(x: f32, y: f32) -> vec3f {
     let depth = (x + y) * 0.5;
     let rise = y - x;

@@ -1,7 +1,7 @@
 // What all programs of the projection share: the frame, its rays, and what limits them.
 
-/// All rays of a frame, as in traverse.wgsl, but seen from `base`: the place where the middle one starts. Coordinates are the
-/// mesh's normalised ones, relative to it.
+/// All rays of a frame, as in traverse.wgsl, but seen from `base`: the place where the middle one starts. Coordinates
+/// are the mesh's normalised ones, relative to it.
 struct Frame {
     /// The base as the sum of two numbers, the second much smaller.
     base: vec4f,
@@ -57,8 +57,8 @@ fn origin_at(xy: vec2f) -> vec3f {
     return fma(frame.origin[1].xyz, vec3f(xy.y), frame.origin[0].xyz * xy.x);
 }
 
-/// The part of a ray that is seen: of the pixel with the centre `at`, from `origin` along a unit vector of which the frame's
-/// directions are `stretch` lengths.
+/// The part of a ray that is seen: of the pixel with the centre `at`, from `origin` along a unit vector of which the
+/// frame's directions are `stretch` lengths.
 fn limits_of(at: vec2f, origin: vec3f, along: vec3f, stretch: f32) -> vec2f {
     var limits = vec2f(frame.near, frame.far) * stretch;
     if HAS_ENDS {

@@ -113,7 +113,8 @@ fn key_of(cell: u32) -> u32 {
             return HIDDEN;
         }
     }
-    // Of the squared distance from the eye, with a sphere's radius taken away; its digits are kept where the eye is far.
+    // Of the squared distance from the eye, with a sphere's radius taken away; its digits are kept where the eye is
+    // far.
     var middle = (p[0] + p[1] + p[2] + p[3]) * 0.25;
     var radius = 0.0;
     if BY_SPHERE {
@@ -161,8 +162,9 @@ fn project_all(@builtin(global_invocation_id) id: vec3u) {
     write_record(i, solid_of(corners), values_of(cell, corners), piece, part.rank + i);
 }
 
-/// How the four directions from the eye to the corners depend on each other: Σ a p = 0, the sum of a being six volumes. For a
-/// parallel view, of the projected corners. (Kraus, Qiao & Ebert 2004 call for the thick vertex; this is it, for all cases.)
+/// How the four directions from the eye to the corners depend on each other: Σ a p = 0, the sum of a being six volumes.
+/// For a parallel view, of the projected corners. (Kraus, Qiao & Ebert 2004 call for the thick vertex; this is it, for
+/// all cases.)
 fn dependency(p: array<vec3f, 4>) -> vec4f {
     let b = p[1] - p[0];
     let c = p[2] - p[0];
@@ -174,7 +176,8 @@ fn dependency(p: array<vec3f, 4>) -> vec4f {
     return vec4f(volume - rest.x - rest.y - rest.z, rest);
 }
 
-/// The corners on the outline of a cell with this dependency, in sequence around it; three have the first again as fourth.
+/// The corners on the outline of a cell with this dependency, in sequence around it; three have the first again as
+/// fourth.
 fn outline(a: vec4f) -> vec4u {
     // The side of fewer corners first: one is inside the outline, two are opposite corners of it.
     let positive = a > vec4f(0.0);

@@ -1,11 +1,11 @@
 // The forms that interpolate between the corners of a cell's projection and the point where it is thickest.
 //
-// Kraus, Qiao & Ebert 2004, section 2: of a linear function f only f/w and 1/w are linear on the screen, on the front and on
-// the back; their quotient is what a fragment needs.
+// Kraus, Qiao & Ebert 2004, section 2: of a linear function f only f/w and 1/w are linear on the screen, on the front
+// and on the back; their quotient is what a fragment needs.
 
-// A record is a fan of triangles around the thickest point, which is the first vertex; the outline follows. Each vertex has the values
-// on the front and on the back (for INTERPOLATED, over w), 1/w (depth in a parallel view) of both, how much they differ, and how long
-// the ray's way is. The words of a record:
+// A record is a fan of triangles around the thickest point, which is the first vertex; the outline follows. Each vertex
+// has the values on the front and on the back (for INTERPOLATED, over w), 1/w (depth in a parallel view) of both, how
+// much they differ, and how long the ray's way is. The words of a record:
 // 0–2  the line of the function at the least value: value, slope, ends; then the longest edge, and the rank;
 // 3    the interval of that line; and which plane of a cylindrical table holds the thickest point.
 // The values: the least and the greatest.
@@ -43,8 +43,8 @@ fn write_vertex(i: u32, k: u32, corner: vec2f, front: Value, back: Value, depths
     records[i].vertices[k].depths = depths;
 }
 
-/// The piece of a cell that lies behind the plane at the depth `frame.nearest`. With one corner behind it, the first piece is all;
-/// with two or three, a wedge is left, which is three tetrahedra.
+/// The piece of a cell that lies behind the plane at the depth `frame.nearest`. With one corner behind it, the first
+/// piece is all; with two or three, a wedge is left, which is three tetrahedra.
 fn cut(whole: array<vec3f, 4>, whole_values: array<Value, 4>, piece: u32) -> Piece {
     // Corners behind the plane first.
     var behind = array<u32, 4>(0u, 1u, 2u, 3u);
@@ -111,8 +111,8 @@ fn cut(whole: array<vec3f, 4>, whole_values: array<Value, 4>, piece: u32) -> Pie
     return Piece(p, v, true);
 }
 
-/// The corners of an outline so that it turns anticlockwise. Where rounding puts the thickest point outside, one triangle of the fan turns
-/// the other way: it lies on the others, and is not drawn.
+/// The corners of an outline so that it turns anticlockwise. Where rounding puts the thickest point outside, one
+/// triangle of the fan turns the other way: it lies on the others, and is not drawn.
 fn anticlockwise(corners: array<vec3f, 4>, around: vec4u) -> vec4u {
     var p = corners;
     let a = pixel_of(seen(p[around.z])) - pixel_of(seen(p[around.x]));

@@ -5,7 +5,8 @@
 // 3    that middle, and the nearnesses between which rays are seen;
 // 4    depth and t there, the longest edge, and the interval of the function that holds the least value;
 // 5–7  the line of that interval: value, slope, ends; then the rank, and which facets are entered.
-// The values: in the middle; how it rises from pixel to pixel to the right and down, and towards the eye; the least and the greatest.
+// The values: in the middle; how it rises from pixel to pixel to the right and down, and towards the eye; the least and
+// the greatest.
 
 /// To pixels from the upper left corner of the image.
 fn pixel_of(p: vec3f) -> vec2f {
@@ -45,7 +46,8 @@ fn greatest_of(v: vec4f) -> f32 {
     return max(max(v.x, v.y), max(v.z, v.w));
 }
 
-/// The corners (x, y) around an outline, of which the fourth may be the first, moved outward so that all edges are GROWTH further out.
+/// The corners (x, y) around an outline, of which the fourth may be the first, moved outward so that all edges are
+/// GROWTH further out.
 fn grown(x: vec4f, y: vec4f) -> array<vec2f, 4> {
     let is_triangle = x.w == x.x && y.w == y.x;
     let turn = select(-1.0, 1.0, (x.z - x.x) * (y.w - y.y) - (y.z - y.x) * (x.w - x.y) > 0.0);
@@ -109,7 +111,8 @@ fn write_record(i: u32, solid: Solid, v: array<Value, 4>, piece: u32, rank: u32)
     }
     centre = floor(clamp(centre, vec2f(0.0), frame.size - 1.0)) + 0.5;
     let xy = sample_of(centre);
-    // Where the pixel's ray is as deep as the cell's middle, how far that is from one pixel to the next, and from the eye.
+    // Where the pixel's ray is as deep as the cell's middle, how far that is from one pixel to the next, and from the
+    // eye.
     var t = dot(centroid, frame.forward.xyz);
     var depth = 1.0;
     if frame.perspective == 1u {

@@ -1,6 +1,7 @@
 // From a segment of a ray to a fragment; and from a stored corner to a vertex.
 
-/// Of each triangle the first vertex's words are taken. Positions have w = 1, so that all that is not flat is interpolated linearly on the screen.
+/// Of each triangle the first vertex's words are taken. Positions have w = 1, so that all that is not flat is
+/// interpolated linearly on the screen.
 @vertex
 fn vertex(stored: Stored) -> Drawn {
     let at = stored.corner / frame.size;
@@ -11,8 +12,8 @@ fn most_work() -> u32 {
     return MOST_WORK;
 }
 
-/// The intervals of the function, LINES_ACROSS in a row: value, slope, and ends below each other. A texture, as drivers in software
-/// look buffers up lane by lane.
+/// The intervals of the function, LINES_ACROSS in a row: value, slope, and ends below each other. A texture, as drivers
+/// in software look buffers up lane by lane.
 @group(0) @binding(10) var lines: texture_2d<f32>;
 
 /// A line of the function of the last component, and between which values it is that.
@@ -34,9 +35,9 @@ fn interval_of(s: f32) -> u32 {
     return track(function.opacity, select(function.end, function.color, PAIR), 0u, s, s).i;
 }
 
-/// Premultiplied colour and opacity of a segment, by the exact integral; `line` is that of the interval `i`, in which the lesser value is or
-/// one below it. Intervals are taken from the lesser value to the greater, whichever is in front, so that the first is the same for all
-/// fragments of a cell and comes with it.
+/// Premultiplied colour and opacity of a segment, by the exact integral; `line` is that of the interval `i`, in which
+/// the lesser value is or one below it. Intervals are taken from the lesser value to the greater, whichever is in
+/// front, so that the first is the same for all fragments of a cell and comes with it.
 fn integrated(front: Value, back: Value, length: f32, first: u32, first_line: Line) -> vec4f {
     let rises = last_of(front) <= last_of(back);
     let low = min(last_of(front), last_of(back));
@@ -101,8 +102,8 @@ fn hash(v: vec3u) -> vec3u {
     return h;
 }
 
-/// As the target holds it: with dithering, opacity (or, where cells only add up, colour) is rounded up with the probability of its
-/// fraction, and the colour follows the opacity.
+/// As the target holds it: with dithering, opacity (or, where cells only add up, colour) is rounded up with the
+/// probability of its fraction, and the colour follows the opacity.
 fn quantised(color: vec4f, at: vec2f, rank: u32) -> vec4f {
     if !DITHERED {
         return color;

@@ -1,5 +1,5 @@
-// A stable radix sort of keys and the numbers that go with them: for each digit of 4 bits, `count` the digits of each block of
-// items, `sum` these counts up, and `scatter` the items. In the first pass keys of SKIPPED are left out.
+// A stable radix sort of keys and the numbers that go with them: for each digit of 4 bits, `count` the digits of each
+// block of items, `sum` these counts up, and `scatter` the items. In the first pass keys of SKIPPED are left out.
 
 struct Pass {
     /// Items at most; in later passes there are `total`, where that is fewer.

@@ -4,9 +4,11 @@
 
 /// How a table is looked up.
 struct Table {
-    /// Texels along its axes, and the length of the thinnest slice but 0 (of other forms and of uniform lengths, the longest).
+    /// Texels along its axes, and the length of the thinnest slice but 0 (of other forms and of uniform lengths, the
+    /// longest).
     size: vec4f,
-    /// Of a cylinder's tiles: how many are beside each other, and in a layer; the reciprocals of a layer's width and height.
+    /// Of a cylinder's tiles: how many are beside each other, and in a layer; the reciprocals of a layer's width and
+    /// height.
     tiles: vec4f,
     /// What texels are multiplied by, and what is added; for polynomials for each power.
     span: array<vec4f, 9>,

@@ -34,7 +34,8 @@ struct Frame {
     planes: u32,
     /// Whether `ends` holds a value for each pixel of the image.
     has_ends: u32,
-    /// Number of leaves of the hierarchy, of faces, of steps that no walk exceeds, and of loop iterations that no ray may.
+    /// Number of leaves of the hierarchy, of faces, of steps that no walk exceeds, and of loop iterations that no ray
+    /// may.
     leaves: u32,
     faces: u32,
     most_steps: u32,
@@ -72,8 +73,8 @@ var<private> known: u32;
 /// The largest values along a ray; the last of them at −FAR if there are none.
 var<private> largest: Value;
 var<private> steps: u32;
-/// Whether all of the ray was walked: llvmpipe leaves loops after 65,535 iterations of all loops of 8 rays together, so that
-/// rays which take much work are given up before, and the CPU draws them.
+/// Whether all of the ray was walked: llvmpipe leaves loops after 65,535 iterations of all loops of 8 rays together, so
+/// that rays which take much work are given up before, and the CPU draws them.
 var<private> finished: bool;
 
 @compute @workgroup_size(8, 8)
@@ -320,8 +321,8 @@ fn walk(ray: Ray, entry: Entry, limits: vec2f) -> bool {
             back = interpolated(corners, weights);
         }
 
-        // The length comes from the volume, which is right in the thinnest cell. But in one that is seen edge-on the areas are not,
-        // and the depths of the corners are.
+        // The length comes from the volume, which is right in the thinnest cell. But in one that is seen edge-on the
+        // areas are not, and the depths of the corners are.
         let share = dot(weights, select(vec3f(), vec3f(1.0), drops));
         let left_at = depth_of(face, weights);
         let ahead = depth_between(entered, left_at) * ray.length;

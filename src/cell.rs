@@ -1,11 +1,11 @@
 //! A ray and a tetrahedron.
 //!
-//! Points are projected along the ray: the ray becomes the origin of a plane, and everything that can be asked about a cell
-//! is answered by the sides on which the origin lies of the projected edges. Those signs are exact, so they are the same
-//! for every cell that shares the edge; an origin on an edge is moved aside by an infinitesimal step that is the same for
-//! all of them. Then of the four faces of a tetrahedron exactly none or two hold the origin, whatever its shape, and a walk
-//! from cell to cell through such faces can neither get lost nor return (Garrity 1990 gives the walk; Edelsbrunner & Mücke
-//! 1990 the infinitesimal step).
+//! Points are projected along the ray: the ray becomes the origin of a plane, and everything that can be asked about a
+//! cell is answered by the sides on which the origin lies of the projected edges. Those signs are exact, so they are
+//! the same for every cell that shares the edge; an origin on an edge is moved aside by an infinitesimal step that is
+//! the same for all of them. Then of the four faces of a tetrahedron exactly none or two hold the origin, whatever its
+//! shape, and a walk from cell to cell through such faces can neither get lost nor return (Garrity 1990 gives the walk;
+//! Edelsbrunner & Mücke 1990 the infinitesimal step).
 
 use glam::DVec3;
 
@@ -54,8 +54,8 @@ pub fn cross(a: Projected, b: Projected) -> f64 {
     a.x * b.y - a.y * b.x
 }
 
-/// Whether the origin lies to the left of the line from `a` to `b`; `cross` is theirs. Exact, and never the same for (b, a)
-/// unless the two coincide.
+/// Whether the origin lies to the left of the line from `a` to `b`; `cross` is theirs. Exact, and never the same for
+/// (b, a) unless the two coincide.
 #[inline(always)]
 pub fn is_left(a: Projected, b: Projected, cross: f64) -> bool {
     // Each product is off by half a unit in the last place, their difference by one more.
@@ -95,8 +95,8 @@ impl Face {
             .then_some(Face { corners, areas })
     }
 
-    /// Walks through the cell that has this face and the further corner `apex`, to the other face that holds the origin:
-    /// there `apex` takes the place of the corner whose index is returned.
+    /// Walks through the cell that has this face and the further corner `apex`, to the other face that holds the
+    /// origin: there `apex` takes the place of the corner whose index is returned.
     #[inline(always)]
     pub fn step(&mut self, apex: Projected) -> usize {
         let [a, b, c] = self.corners;

@@ -1,7 +1,7 @@
 //! The bridge to C++: what `cpp/core/halite.h` is made of, which is the face that programs see. No logic is here.
 //!
-//! A panic that crossed the border would abort the host, so every function is guarded, and returns a `Result`: in C++ an
-//! exception.
+//! A panic that crossed the border would abort the host, so every function is guarded, and returns a `Result`: in C++
+//! an exception.
 
 #![allow(unsafe_code, reason = "cxx makes unsafe code of the bridge")]
 #![allow(clippy::needless_pass_by_value, reason = "the bridge hands structs over by value")]

@@ -1,4 +1,5 @@
-//! The mesh as engines read it: coordinates near 0, points and cells where memory is near, and the field's values in that order.
+//! The mesh as engines read it: coordinates near 0, points and cells where memory is near, and the field's values in
+//! that order.
 //!
 //! [`boundary`] finds the faces through which rays enter, [`contacts`] what touches without sharing faces.
 
@@ -94,8 +95,8 @@ impl Geometry {
         Self::new(points, tetrahedra, &Faces { neighbours, ..Faces::default() })
     }
 
-    /// Moves the points: `points` are as many as before, in world coordinates. Cells keep their neighbours, so none may turn inside
-    /// out, and points that shared a position still must.
+    /// Moves the points: `points` are as many as before, in world coordinates. Cells keep their neighbours, so none may
+    /// turn inside out, and points that shared a position still must.
     pub fn set_points(&mut self, points: &[DVec3]) {
         let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
         let [low, high] = self

@@ -255,7 +255,8 @@ impl Gpu {
     /// What went wrong since the device was opened.
     ///
     /// # Errors
-    /// [`Error::Lost`] if the device is gone, [`Error::Memory`] if it has no more memory, [`Error::Device`] if it refused a call.
+    /// [`Error::Lost`] if the device is gone, [`Error::Memory`] if it has no more memory, [`Error::Device`] if it
+    /// refused a call.
     pub(crate) fn check(&self) -> Result<()> {
         let fault = || self.fault.lock().unwrap_or_else(PoisonError::into_inner);
         if fault().is_some() {

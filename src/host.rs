@@ -1,5 +1,5 @@
-//! What a program that embeds Halite needs around a [`Renderer`]: calls that never unwind, progress told on the caller's own
-//! thread, points under a matrix, and a log that is asked for.
+//! What a program that embeds Halite needs around a [`Renderer`]: calls that never unwind, progress told on the
+//! caller's own thread, points under a matrix, and a log that is asked for.
 
 use crate::error::{Error, Result};
 use crate::field::Field;
@@ -89,7 +89,8 @@ enum State {
 }
 
 impl Session {
-    /// A session with `threads` threads of its own (0: one for each core), on a device as [`DeviceChoice::parse`] reads it.
+    /// A session with `threads` threads of its own (0: one for each core), on a device as [`DeviceChoice::parse`] reads
+    /// it.
     ///
     /// # Errors
     /// Those of [`Renderer::with_engine`]; [`Error::Render`] if `engine` is none of [`ENGINES`].
@@ -134,8 +135,8 @@ impl Session {
         result
     }
 
-    /// Draws `mesh`, under a matrix, from now on; the field must be set again. A mesh with nothing to draw is no error: its
-    /// pictures are empty.
+    /// Draws `mesh`, under a matrix, from now on; the field must be set again. A mesh with nothing to draw is no error:
+    /// its pictures are empty.
     ///
     /// # Errors
     /// [`Error::Mesh`] as [`Tetrahedra::new`], or if the matrix is not affine or not finite.
@@ -169,7 +170,8 @@ impl Session {
         Ok(())
     }
 
-    /// Draws the mesh with its points moved, under another matrix. False if that cannot be: the mesh must then be set again.
+    /// Draws the mesh with its points moved, under another matrix. False if that cannot be: the mesh must then be set
+    /// again.
     ///
     /// # Errors
     /// [`Error::Mesh`] if there are not as many points as before, or the matrix is not affine or not finite.
@@ -203,7 +205,8 @@ impl Session {
         self.renderer.set_transfer(transfer);
     }
 
-    /// Draws a frame. While that takes, `progress` is told every 20 ms, on this thread, the share that is done; false ends it.
+    /// Draws a frame. While that takes, `progress` is told every 20 ms, on this thread, the share that is done; false
+    /// ends it.
     ///
     /// # Errors
     /// Those of [`Renderer::render`], and of `progress`.

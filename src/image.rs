@@ -69,7 +69,8 @@ impl Image {
     /// float RGBA) or `.png` (8-bit, linear as the picture is, over `backdrop`). A file is written whole or not at all.
     ///
     /// # Errors
-    /// [`Error::File`], [`Error::Unsupported`] for any other ending, or [`Error::View`] if the backdrop has another size.
+    /// [`Error::File`], [`Error::Unsupported`] for any other ending, or [`Error::View`] if the backdrop has another
+    /// size.
     pub fn save(&self, path: &Path, backdrop: Backdrop) -> Result<()> {
         let [w, h] = self.size.map(|n| n as usize);
         let bytes = match ending(path).as_str() {
@@ -114,8 +115,8 @@ impl Image {
         Some(Difference { rmse: (d.rmse / n).sqrt(), mean: d.mean / n, ..d })
     }
 
-    /// An opaque picture of the absolute differences to `other` times `gain`, in [0, 1]; an opacity that differs where the
-    /// colours do not shows grey. None if the sizes differ.
+    /// An opaque picture of the absolute differences to `other` times `gain`, in [0, 1]; an opacity that differs where
+    /// the colours do not shows grey. None if the sizes differ.
     pub fn difference(&self, other: &Image, gain: f32) -> Option<Image> {
         let show = |(a, b): (&[f32; 4], &[f32; 4])| {
             let e: [f32; 4] = std::array::from_fn(|k| (distance(a[k], b[k]) as f32 * gain).min(1.0));

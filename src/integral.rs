@@ -1,16 +1,17 @@
 //! The ray-segment integral: what a straight piece of a ray inside one cell emits and absorbs.
 //!
-//! Inside a tetrahedron the scalar is linear along the ray, so a segment is its values at both ends and its length. It is
-//! split where the scalar crosses a knot of the transfer function; in such a *piece* extinction τ and colour c are linear
-//! too. With optical depths x = τ_f l and y = τ_b l per piece length l, and T(u) = x u + (y − x) u²/2 for u in [0, 1]:
+//! Inside a tetrahedron the scalar is linear along the ray, so a segment is its values at both ends and its length. It
+//! is split where the scalar crosses a knot of the transfer function; in such a *piece* extinction τ and colour c are
+//! linear too. With optical depths x = τ_f l and y = τ_b l per piece length l, and T(u) = x u + (y − x) u²/2 for u in
+//! [0, 1]:
 //!
 //! - opacity α = 1 − e^{−(x+y)/2};
-//! - chromatic emission q = c τ: C = c_f (α − β) + c_b β with β = ∫ u T′(u) e^{−T(u)} du, which is Ψ − e^{−(x+y)/2} in the
-//!   terms of Moreland & Angel (2004, partial pre-integration) without its cancellation;
+//! - chromatic emission q = c τ: C = c_f (α − β) + c_b β with β = ∫ u T′(u) e^{−T(u)} du, which is Ψ − e^{−(x+y)/2} in
+//!   the terms of Moreland & Angel (2004, partial pre-integration) without its cancellation;
 //! - direct emission q: C = l (q_f (Ψ − Φ) + q_b Φ) with Ψ = ∫ e^{−T(u)} du and Φ = ∫ u e^{−T(u)} du.
 //!
-//! Up to an optical depth of 1 the integrals over u are series ([`Piece::new`]), beyond that Gauss–Legendre sums, both as accurate as f32
-//! can tell; pieces of great optical depth are first cut where nothing more can be seen.
+//! Up to an optical depth of 1 the integrals over u are series ([`Piece::new`]), beyond that Gauss–Legendre sums, both
+//! as accurate as f32 can tell; pieces of great optical depth are first cut where nothing more can be seen.
 
 mod batch;
 pub mod choice;
@@ -100,12 +101,13 @@ fn gauss<A: Real, const N: usize>(
 impl<R: Real> Piece<R> {
     const NONE: fn() -> Self = || Piece { alpha: R::of(0.0), front: R::of(0.0), back: R::of(0.0) };
 
-    /// As [`Piece::new`] for depths up to [`MILD`]; takes no decisions, so that a loop over it becomes vector instructions.
+    /// As [`Piece::new`] for depths up to [`MILD`]; takes no decisions, so that a loop over it becomes vector
+    /// instructions.
     ///
     /// With the mean depth D = (x + y)/2, δ = y − x and v = u − ½ it is e^{−T(u)} = e^{−D/2} e^{−Dv} e^{δ(¼−v²)/2}. So
-    /// Ψ = ∫ e^{−T} du is e^{−D/2} (N₀ + δ/2 N₁ + δ²/8 N₂ + …) with the even series N_k = ∫ (¼ − v²)ᵏ cosh(D v) dv, which converge fast.
-    /// By parts, ∫ v e^{−T} du = −D (Ψ − e^{−D/2} N₀)/δ and ∫ u T′ e^{−T} du = Ψ − e^{−D}, of whose terms the ones of N₀ and of
-    /// q = 1 − e^{−D/2} cancel by hand.
+    /// Ψ = ∫ e^{−T} du is e^{−D/2} (N₀ + δ/2 N₁ + δ²/8 N₂ + …) with the even series N_k = ∫ (¼ − v²)ᵏ cosh(D v) dv,
+    /// which converge fast. By parts, ∫ v e^{−T} du = −D (Ψ − e^{−D/2} N₀)/δ and ∫ u T′ e^{−T} du = Ψ − e^{−D}, of
+    /// whose terms the ones of N₀ and of q = 1 − e^{−D/2} cancel by hand.
     #[inline(always)]
     fn mild(x: R, y: R, direct: bool) -> Self {
         let (one, half, of) = (R::of(1.0), R::of(0.5), R::of);
@@ -137,7 +139,8 @@ impl<R: Real> Piece<R> {
         gauss(&GAUSS_6, x, y, R::of(0.0), R::of(1.0), direct, Self::NONE())
     }
 
-    /// A piece of optical depths `x` (τ_f l) and `y` (τ_b l), both finite and at least 0. Error at most 1e-6, and 1e-5 of α.
+    /// A piece of optical depths `x` (τ_f l) and `y` (τ_b l), both finite and at least 0. Error at most 1e-6, and 1e-5
+    /// of α.
     #[inline(always)]
     pub fn new(x: R, y: R, direct: bool) -> Self {
         let (zero, one) = (R::of(0.0), R::of(1.0));
@@ -202,8 +205,8 @@ pub struct Exact<R> {
 }
 
 impl<R: Real> Exact<R> {
-    /// Prepares `transfer` for a field of `kind` whose components are mapped by `normal`, on a mesh whose coordinates were
-    /// multiplied by `scale`.
+    /// Prepares `transfer` for a field of `kind` whose components are mapped by `normal`, on a mesh whose coordinates
+    /// were multiplied by `scale`.
     pub fn new(transfer: &TransferFunction, kind: Kind, normal: &[Normal; 4], scale: f64) -> Self {
         let direct = matches!(transfer.emission(), Emission::Direct { .. });
         let emission = match transfer.emission() {
@@ -231,9 +234,9 @@ impl<R: Real> Exact<R> {
         Exact { kind, opacity, color, scale: R::of(emission), direct }
     }
 
-    /// Calls `piece` for each piece of a segment whose field is `front` where the ray enters and `back` where it leaves, in
-    /// order: with extinction and colour at its two ends, and its share of the segment's length. Values that are not finite
-    /// make the segment invisible. `N` is the number of the field's components.
+    /// Calls `piece` for each piece of a segment whose field is `front` where the ray enters and `back` where it
+    /// leaves, in order: with extinction and colour at its two ends, and its share of the segment's length. Values that
+    /// are not finite make the segment invisible. `N` is the number of the field's components.
     #[inline(always)]
     pub fn for_each_piece<const N: usize>(
         &self,

@@ -46,12 +46,12 @@ const STRUCTURED: &str =
 const MULTIBLOCK: &str =
     "a list of blocks, which Halite cannot read; merge them (in ParaView: Merge Blocks), save that as .vtu";
 
-/// Reads a mesh: the file's grid as it is, nothing welded, dropped or repaired. `progress` is told the share of the work
-/// that is done, in [0, 1], never less than before.
+/// Reads a mesh: the file's grid as it is, nothing welded, dropped or repaired. `progress` is told the share of the
+/// work that is done, in [0, 1], never less than before.
 ///
-/// The content decides: `.vtu` XML of every data mode, uncompressed or packed, or a legacy `.vtk` file. Several pieces become one
-/// mesh, with the arrays that all pieces with points (or cells) have: of one number type if they agree, as f64 if not. Arrays of
-/// strings, and field data, are left out. The work is done in the current rayon pool.
+/// The content decides: `.vtu` XML of every data mode, uncompressed or packed, or a legacy `.vtk` file. Several pieces
+/// become one mesh, with the arrays that all pieces with points (or cells) have: of one number type if they agree, as
+/// f64 if not. Arrays of strings, and field data, are left out. The work is done in the current rayon pool.
 ///
 /// # Errors
 /// [`Error::File`], [`Error::Malformed`] or [`Error::Unsupported`], naming the file and the place in it.

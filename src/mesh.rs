@@ -118,7 +118,8 @@ pub const POLYHEDRON: u8 = 42;
 /// The faces of the polyhedra among the cells of a mesh.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Polyhedra {
-    /// Cell `c` has the faces `cells[c]..cells[c + 1]`, none if it is no polyhedron; one entry more than cells, the first is 0.
+    /// Cell `c` has the faces `cells[c]..cells[c + 1]`, none if it is no polyhedron; one entry more than cells, the
+    /// first is 0.
     pub cells: Vec<u64>,
     /// Face `f` has the points `points[faces[f]..faces[f + 1]]`; one entry more than faces, the first is 0.
     pub faces: Vec<u64>,
@@ -152,8 +153,8 @@ impl Mesh {
     /// Checks the parts and makes a mesh of them.
     ///
     /// # Errors
-    /// [`Error::Mesh`] if there are more than 2³² − 2 points, if offsets do not start at 0, decrease or pass the end of the
-    /// connectivity, if a cell names a point that does not exist, or if an array's length is not
+    /// [`Error::Mesh`] if there are more than 2³² − 2 points, if offsets do not start at 0, decrease or pass the end of
+    /// the connectivity, if a cell names a point that does not exist, or if an array's length is not
     /// components × points (or cells).
     pub fn new(points: Vec<DVec3>, cells: Cells, point_arrays: Vec<Array>, cell_arrays: Vec<Array>) -> Result<Self> {
         let fail = |what: String| Err(Error::Mesh(what));
@@ -187,8 +188,8 @@ impl Mesh {
     /// The same mesh, with the faces of its polyhedra; without, they are not drawn.
     ///
     /// # Errors
-    /// [`Error::Mesh`] if there are not as many entries as cells need, if they do not start at 0, decrease or pass the end of the
-    /// next list, or if a face names a point that does not exist.
+    /// [`Error::Mesh`] if there are not as many entries as cells need, if they do not start at 0, decrease or pass the
+    /// end of the next list, or if a face names a point that does not exist.
     pub fn with_polyhedra(mut self, polyhedra: Polyhedra) -> Result<Self> {
         self.set_polyhedra(polyhedra)?;
         Ok(self)

@@ -1,8 +1,8 @@
 //! The projection engine: cells are sorted by depth, projected to triangles, and blended from back to front.
 //!
-//! Shirley & Tuchman's projected tetrahedra (1990) as Kraus, Qiao & Ebert made them right (Projecting Tetrahedra without
-//! Rendering Artifacts, 2004). It needs no neighbours, so it also draws meshes whose topology moves; and it is a test bed,
-//! in which each published variant can be switched on: [`Switches`] are what differs.
+//! Shirley & Tuchman's projected tetrahedra (1990) as Kraus, Qiao & Ebert made them right (Projecting Tetrahedra
+//! without Rendering Artifacts, 2004). It needs no neighbours, so it also draws meshes whose topology moves; and it is
+//! a test bed, in which each published variant can be switched on: [`Switches`] are what differs.
 
 mod frame;
 pub(crate) mod gpu;
@@ -22,8 +22,8 @@ pub struct Switches {
     pub order: Order,
     /// What cells are blended into.
     pub target: Target,
-    /// Alpha dithering (Kraus et al. 2004, section 4.2): before they are blended into 8 bits, opacities are rounded up with a
-    /// probability of the fraction that is lost else. Nothing for other targets.
+    /// Alpha dithering (Kraus et al. 2004, section 4.2): before they are blended into 8 bits, opacities are rounded up
+    /// with a probability of the fraction that is lost else. Nothing for other targets.
     pub dither: bool,
     /// How a cell joins what lies behind it.
     pub compositing: Compositing,
@@ -38,7 +38,8 @@ pub enum Fragments {
     Intersected,
     /// Interpolated between the projected corners, with the correction for perspective (Kraus et al. 2004, section 2).
     Interpolated,
-    /// Interpolated linearly on the screen, as in the earlier systems (Röttger, Kraus & Ertl 2000): wrong in perspective views.
+    /// Interpolated linearly on the screen, as in the earlier systems (Röttger, Kraus & Ertl 2000): wrong in
+    /// perspective views.
     Linear,
 }
 
@@ -98,7 +99,8 @@ pub(crate) struct Counts {
     pub(crate) records: u64,
     /// Finding the cells that are seen and sorting them; 0 where the order was known.
     pub(crate) order_ms: f64,
-    /// By the device's own clock, where it has one, or in software the host's: projecting all cells of the order, and drawing them.
+    /// By the device's own clock, where it has one, or in software the host's: projecting all cells of the order, and
+    /// drawing them.
     pub(crate) project_ms: Option<f64>,
     pub(crate) draw_ms: Option<f64>,
     /// Fragments that were computed, where the device counts them.

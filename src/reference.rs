@@ -38,8 +38,8 @@ pub struct Reference<'a> {
     extent: f64,
 }
 
-/// What a segment of `length` world units emits and absorbs, premultiplied RGBA, whose field of one component, in the array's own
-/// units, is linear from `front`, where the ray enters, to `back`.
+/// What a segment of `length` world units emits and absorbs, premultiplied RGBA, whose field of one component, in the
+/// array's own units, is linear from `front`, where the ray enters, to `back`.
 pub fn segment(transfer: &TransferFunction, front: f64, back: f64, length: f64) -> [f64; 4] {
     let alone = Reference { transfer, kind: Kind::Scalar, cells: vec![], centre: DVec3::ZERO, extent: 0.0 };
     let interval = Interval { t: [0.0, length], values: [front, back].map(|s| [s, 0.0, 0.0, 0.0]) };
@@ -316,7 +316,8 @@ impl Light {
         let [a0, a1] = [piece.ends[0][3], piece.ends[1][3]];
         let per_unit = piece.length / transfer.unit_distance();
         let logarithmic = transfer.convention() == Convention::Opacity;
-        // Pieces end where the opacity passes 1, so its mean tells on which side they are; their ends are off by rounding.
+        // Pieces end where the opacity passes 1, so its mean tells on which side they are; their ends are off by
+        // rounding.
         if logarithmic && (a0 + a1 >= 2.0 || (a0 == a1 && a0 >= OPAQUE)) {
             for k in 0..3 {
                 self.color[k] += if direct { 0.0 } else { self.transmittance * piece.ends[0][k] };

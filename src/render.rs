@@ -34,7 +34,8 @@ pub enum Engine {
     Auto,
     /// Rays walk from cell to cell; exact for every mesh. See [`crate::traverse`].
     Traverse,
-    /// Cells are sorted by depth, projected and blended; needs a graphics device, be it in software. See [`crate::project`].
+    /// Cells are sorted by depth, projected and blended; needs a graphics device, be it in software. See
+    /// [`crate::project`].
     Project,
 }
 
@@ -130,7 +131,8 @@ pub struct Stats {
     pub frame_ms: f64,
     /// The form of the ray integral that it was drawn with.
     pub integral: String,
-    /// Building its table, in ms (on a device: 0 unless the frame waited for that), and what that takes, in bytes; 0 without one.
+    /// Building its table, in ms (on a device: 0 unless the frame waited for that), and what that takes, in bytes; 0
+    /// without one.
     pub table_ms: f64,
     /// See [`Self::table_ms`].
     pub table_bytes: u64,
@@ -179,8 +181,8 @@ impl Renderer {
     /// A renderer on `threads` threads of its own and the chosen device.
     ///
     /// # Errors
-    /// [`Error::Render`] if the threads cannot be started; [`Error::Device`] if the device is none of this machine's, or
-    /// cannot be used. With [`DeviceChoice::Auto`] the CPU draws then.
+    /// [`Error::Render`] if the threads cannot be started; [`Error::Device`] if the device is none of this machine's,
+    /// or cannot be used. With [`DeviceChoice::Auto`] the CPU draws then.
     pub fn with_device(threads: usize, choice: DeviceChoice) -> Result<Self> {
         Self::with_engine(threads, choice, Engine::Auto)
     }
@@ -188,7 +190,8 @@ impl Renderer {
     /// A renderer on `threads` threads of its own and the chosen device, which draws with `engine`.
     ///
     /// # Errors
-    /// As [`Self::with_device`]; and [`Error::Device`] if the engine is [`Engine::Project`] and there is no graphics device.
+    /// As [`Self::with_device`]; and [`Error::Device`] if the engine is [`Engine::Project`] and there is no graphics
+    /// device.
     pub fn with_engine(threads: usize, choice: DeviceChoice, engine: Engine) -> Result<Self> {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
@@ -268,8 +271,8 @@ impl Renderer {
         self.switches = switches;
     }
 
-    /// Integrates segments in another form from now on. The next frame waits for its table, if one was named; with [`Form::Auto`]
-    /// frames are exact until there is a table.
+    /// Integrates segments in another form from now on. The next frame waits for its table, if one was named; with
+    /// [`Form::Auto`] frames are exact until there is a table.
     pub fn set_integral(&mut self, integral: Choice) {
         if self.integral != integral {
             self.integral = integral;
@@ -277,8 +280,8 @@ impl Renderer {
         }
     }
 
-    /// Has the next frame wait for its table. Else one that follows a change of the transfer function is drawn with the exact
-    /// integral while its table is built, and so are those after it until that is done.
+    /// Has the next frame wait for its table. Else one that follows a change of the transfer function is drawn with the
+    /// exact integral while its table is built, and so are those after it until that is done.
     pub fn wait_for_table(&mut self) {
         self.waits = true;
     }
@@ -316,8 +319,8 @@ impl Renderer {
         self.waits = self.integral.form != Form::Auto;
     }
 
-    /// Moves the points of the mesh; cells, fields and values stay. Cells keep their neighbours, so none may turn inside out,
-    /// and points that shared a position still must; else set the mesh.
+    /// Moves the points of the mesh; cells, fields and values stay. Cells keep their neighbours, so none may turn
+    /// inside out, and points that shared a position still must; else set the mesh.
     ///
     /// # Errors
     /// [`Error::Render`] if there is no mesh; [`Error::Mesh`] if it has another number of points, or one is not finite.
@@ -374,14 +377,15 @@ impl Renderer {
         self.forget(Part::Function);
     }
 
-    /// Draws a frame. `progress` is told the share that is done, in [0, 1], and may be called from several threads. It may
-    /// answer [`ControlFlow::Break`]: the frame is then given up, on the CPU soon.
+    /// Draws a frame. `progress` is told the share that is done, in [0, 1], and may be called from several threads. It
+    /// may answer [`ControlFlow::Break`]: the frame is then given up, on the CPU soon.
     ///
     /// A device that is lost is opened again, once a frame; where that fails, the CPU draws from then on.
     ///
     /// # Errors
-    /// [`Error::Render`] if mesh, field or transfer function were never set; [`Error::Memory`] if they do not fit the device,
-    /// and [`Error::Device`] if it refuses them, unless it was not named; [`Error::Aborted`] if `progress` wanted no more.
+    /// [`Error::Render`] if mesh, field or transfer function were never set; [`Error::Memory`] if they do not fit the
+    /// device, and [`Error::Device`] if it refuses them, unless it was not named; [`Error::Aborted`] if `progress`
+    /// wanted no more.
     pub fn render<A: Answer>(&mut self, view: &View, progress: &(dyn Fn(f64) -> A + Sync)) -> Result<Image> {
         let stopped = AtomicBool::new(false);
         let tell = |share: f64| {

@@ -48,8 +48,8 @@ impl TransferFunction {
     /// distance is in world units.
     ///
     /// # Errors
-    /// [`Error::Transfer`] if a list is empty or decreases in s, a number is not finite, a colour or opacity is negative, or
-    /// the unit distance is not above 0.
+    /// [`Error::Transfer`] if a list is empty or decreases in s, a number is not finite, a colour or opacity is
+    /// negative, or the unit distance is not above 0.
     pub fn new(color: Vec<(f64, [f64; 3])>, opacity: Vec<(f64, f64)>, unit_distance: f64) -> Result<Self> {
         let fail = |what: String| Err(Error::Transfer(what));
         if !(unit_distance > 0.0 && unit_distance.is_finite()) {

@@ -102,7 +102,8 @@ pub struct Fan {
 }
 
 impl Fan {
-    /// `v`, one of the fan's two forms, per column and row of an image of `size` pixels: pixel (i, j) has v · (1, i, j).
+    /// `v`, one of the fan's two forms, per column and row of an image of `size` pixels: pixel (i, j) has v · (1, i,
+    /// j).
     pub fn by_pixel(&self, v: [DVec3; 3], size: [u32; 2]) -> [DVec3; 3] {
         let [w, h] = size.map(f64::from);
         let first = v[0] + v[1] * (1.0 / w - 1.0 + self.offset.x) + v[2] * (1.0 - 1.0 / h + self.offset.y);
@@ -161,8 +162,8 @@ impl Lens {
         Self::new(origin, direction, forward, matches!(camera.projection, Projection::Perspective { .. }))
     }
 
-    /// The rays of OpenGL's matrices, and the depths of their near and far planes; none if the matrices are singular, or the
-    /// planes not parallel to each other and to the image.
+    /// The rays of OpenGL's matrices, and the depths of their near and far planes; none if the matrices are singular,
+    /// or the planes not parallel to each other and to the image.
     ///
     /// Rays follow from the rows of x, y and w alone, so that a far plane very far away costs no digits.
     fn of_matrices(view: DMat4, projection: DMat4) -> Option<(Self, [f64; 2])> {
@@ -237,12 +238,12 @@ impl View {
     }
 
     /// A view of `size` (width, height) pixels as OpenGL's matrices have it: `view` from the world to the eye (affine),
-    /// `projection` from there to clip coordinates. So cameras off the axis, of one eye of two, sheared or of one tile of an
-    /// image can be had. Near and far plane become the clipping range.
+    /// `projection` from there to clip coordinates. So cameras off the axis, of one eye of two, sheared or of one tile
+    /// of an image can be had. Near and far plane become the clipping range.
     ///
     /// # Errors
-    /// [`Error::View`] if the size is 0 or above 2²⁸ pixels, a matrix is singular or not finite, `view` is not affine, or the
-    /// near and far planes do not ascend or are not parallel to the image.
+    /// [`Error::View`] if the size is 0 or above 2²⁸ pixels, a matrix is singular or not finite, `view` is not affine,
+    /// or the near and far planes do not ascend or are not parallel to the image.
     pub fn from_matrices(view: DMat4, projection: DMat4, size: [u32; 2]) -> Result<Self> {
         check_size(size)?;
         let fail = |what: &str| Err(Error::View(what.into()));
@@ -385,8 +386,8 @@ impl View {
         Ray { origin, direction, t_min, t_max: f64::INFINITY }
     }
 
-    /// The view's rays as one affine form, in coordinates (world − `centre`) · `scale`. They start near the centre, so that f32
-    /// can tell their places; but at the eye of a perspective view if that is not beyond `near_eye` from it.
+    /// The view's rays as one affine form, in coordinates (world − `centre`) · `scale`. They start near the centre, so
+    /// that f32 can tell their places; but at the eye of a perspective view if that is not beyond `near_eye` from it.
     pub fn fan(&self, centre: DVec3, scale: f64, near_eye: f64) -> Fan {
         let [w, h] = self.size.map(f64::from);
         let Lens { origin, direction, forward, meet, .. } = self.lens;

@@ -1,5 +1,5 @@
-//! What the README says about accuracy: pictures by the engine against the reference's, on every kind of mesh that can be
-//! generated. `cargo test --release --test accuracy -- --nocapture` prints the figures.
+//! What the README says about accuracy: pictures by the engine against the reference's, on every kind of mesh that can
+//! be generated. `cargo test --release --test accuracy -- --nocapture` prints the figures.
 
 #![allow(
     clippy::unwrap_used,

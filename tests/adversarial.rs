@@ -28,7 +28,8 @@ const BOUND: f64 = 5e-4;
 const SIZE: [u32; 2] = [11, 9];
 
 fn config(cases: usize) -> ProptestConfig {
-    // The same cases in every run: a test that fails now and then tells nobody what broke it. HALITE_SEED asks for others.
+    // The same cases in every run: a test that fails now and then tells nobody what broke it. HALITE_SEED asks for
+    // others.
     let seed = std::env::var("HALITE_SEED").map_or(2004, |seed| seed.parse().unwrap());
     let rng_seed = RngSeed::Fixed(seed);
     ProptestConfig { cases: rounds(cases) as u32, failure_persistence: None, rng_seed, ..ProptestConfig::default() }
@@ -102,7 +103,8 @@ fn overlaps(mesh: &Mesh) -> usize {
     turned + faces.folded + Contacts::new(&Geometry::new(&points, &tetrahedra, &faces)).overlapping
 }
 
-/// Pictures by all engines: the CPU's, and for some that of the device `HALITE_TEST_DEVICE`, or the first, if there is one.
+/// Pictures by all engines: the CPU's, and for some that of the device `HALITE_TEST_DEVICE`, or the first, if there is
+/// one.
 fn images(scene: &Scene, view: &View) -> Vec<(&'static str, Image)> {
     /// One of so many: devices in software take a second to compile what most scenes need anew.
     const SOME: usize = 40;
@@ -159,8 +161,8 @@ impl Fitting {
         let is_lattice = name != "ring";
         let flat = if is_lattice { 10f64.powi(-self.thin) } else { 1.0 };
         let turn = DQuat::from_axis_angle(random.direction(), random.within(0.0, 6.0));
-        // Tetrahedra stand on quadrilaterals there, cut as the cells beyond are, by the order of positions: a turn would change
-        // that of the latter only. This keeps it.
+        // Tetrahedra stand on quadrilaterals there, cut as the cells beyond are, by the order of positions: a turn
+        // would change that of the latter only. This keeps it.
         let cut = matches!(name, "mixed" | "unwelded");
         let [p, q, r] = random.point(0.7).to_array();
         let keep = DMat3::from_cols(dvec3(1.0, p, q), dvec3(0.0, 1.0, r), DVec3::Z);
@@ -187,8 +189,8 @@ impl Fitting {
 proptest! {
     #![proptest_config(config(400))]
 
-    /// Cells that fit together, however thin, small, large or far away, with holes, inverted cells and values of any size, some
-    /// of them missing.
+    /// Cells that fit together, however thin, small, large or far away, with holes, inverted cells and values of any
+    /// size, some of them missing.
     #[test]
     fn meshes_that_fit_together(
         kind in 0..MESHES.len(), seed: u64, thin in 0..13i32, scale in -20..21i32, offset in 0..7i32, kept in 0.2..1.0f64,
@@ -203,8 +205,8 @@ proptest! {
         }
     }
 
-    /// Any heap of cells: they overlap, are flat, the same twice, of one point. Engines differ where cells overlap, but lose no
-    /// ray, and draw nothing where there is nothing.
+    /// Any heap of cells: they overlap, are flat, the same twice, of one point. Engines differ where cells overlap, but
+    /// lose no ray, and draw nothing where there is nothing.
     #[test]
     fn heaps_of_cells(
         points in prop::collection::vec([-3..4i8, -3..4i8, -3..4i8], 4..12),
@@ -212,7 +214,8 @@ proptest! {
         odd in prop::collection::vec((any::<u8>(), prop::sample::select(vec![f64::NAN, f64::INFINITY, 1e30, -1e30, 0.0])), 0..3),
         from in [-1.0..1.0f64, -1.0..1.0f64, 0.1..1.0f64],
     ) {
-        // A little off the lattice, and off the middle of the pixels, so that no ray lies in a face: then either side is right.
+        // A little off the lattice, and off the middle of the pixels, so that no ray lies in a face: then either side
+        // is right.
         let place = |p: &[i8; 3]| DVec3::from(p.map(f64::from)) * dvec3(1.0, 0.97, 1.03) + dvec3(0.013, 0.007, -0.011);
         let all: Vec<DVec3> = points.iter().map(place).collect();
         let size = |t: u8| match t { 10 => 4, 12 => 8, 13 => 6, 14 => 5, _ => 10 };
@@ -261,7 +264,8 @@ fn extremes_are_drawn_or_refused() {
     }
 }
 
-/// Schönhardt's twisted prism cannot be cut into tetrahedra without another point: as a polyhedron it has one in its middle.
+/// Schönhardt's twisted prism cannot be cut into tetrahedra without another point: as a polyhedron it has one in its
+/// middle.
 #[test]
 fn the_twisted_prism() {
     let corner = |i: usize, twist: f64, z: f64| {
@@ -277,9 +281,10 @@ fn the_twisted_prism() {
     assert_eq!((tetrahedra.corners.len(), tetrahedra.crooked), (8, 0));
 }
 
-/// Two tetrahedra and a pyramid on one warped quadrilateral, which these cut along one diagonal and it along the other: what lies
-/// between the cuts is empty, or covered twice. There the reference goes through both cells in turn, the engine through one and
-/// then the other, as an overlap has no right order. So they agree on the opacity, but not on the colour.
+/// Two tetrahedra and a pyramid on one warped quadrilateral, which these cut along one diagonal and it along the other:
+/// what lies between the cuts is empty, or covered twice. There the reference goes through both cells in turn, the
+/// engine through one and then the other, as an overlap has no right order. So they agree on the opacity, but not on
+/// the colour.
 #[test]
 fn a_quadrilateral_that_is_cut_both_ways() {
     // By position the pyramid below is cut from point 0 to point 2: along a ridge, or through a valley.

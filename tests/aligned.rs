@@ -1,5 +1,6 @@
 //! Rays that run exactly through vertices, edges and faces: in an even medium each must see the chord of the box that
-//! the mesh fills, whichever cells it touches on the way. A ray that slips between two cells, or counts one twice, shows.
+//! the mesh fills, whichever cells it touches on the way. A ray that slips between two cells, or counts one twice,
+//! shows.
 
 #![allow(clippy::expect_used, clippy::unwrap_used, reason = "a test fails by panicking")]
 

@@ -66,7 +66,8 @@ fn boundaries_alone_touch_nothing() {
 
 #[test]
 fn blocks_that_are_not_welded_touch() {
-    // Where rounding keeps two blocks apart, or makes them overlap by nothing to speak of, all faces between them touch.
+    // Where rounding keeps two blocks apart, or makes them overlap by nothing to speak of, all faces between them
+    // touch.
     for gap in [1e-9, -1e-9, 1e-12] {
         let both = together(&[(&block(3), &|p| p), (&block(3), &|p| p + dvec3(2.0 + gap, 0.0, 0.0))]);
         assert_eq!(contacts(&both), [216, 2 * 18, 0], "{gap}");
@@ -83,7 +84,8 @@ fn t_junctions_touch() {
         let found = contacts(&generate::t_junction(n));
         assert_eq!(found[1..], [10 * n * n, 0], "{n}");
     }
-    // A fault: of two blocks of 4³ hexahedra one is pushed up by half a block, so half of the faces between have a neighbour.
+    // A fault: of two blocks of 4³ hexahedra one is pushed up by half a block, so half of the faces between have a
+    // neighbour.
     let pushed = together(&[(&block(4), &|p| p), (&block(4), &|p| p + dvec3(2.0, 0.0, 1.0))]);
     assert_eq!(contacts(&pushed), [2 * 192 - 2 * 16, 0, 0]);
     let pushed = together(&[(&block(4), &|p| p), (&block(4), &|p| p + dvec3(2.0, 0.0, 1.0 + 1e-3))]);

@@ -1,7 +1,7 @@
 //! What the reader takes of memory: no more than the file justifies, whatever it says.
 //!
-//! A file justifies what an intact one of its size takes when read. So each damaged file, which has its bytes and a few more, may take
-//! 1.5 times as much as the sound one at most, be it read or refused.
+//! A file justifies what an intact one of its size takes when read. So each damaged file, which has its bytes and a few
+//! more, may take 1.5 times as much as the sound one at most, be it read or refused.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 #![allow(clippy::print_stderr, reason = "a test tells what it measured")]

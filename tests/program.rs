@@ -183,7 +183,8 @@ fn info_tells_what_is_there() {
     }
 }
 
-/// A tetrahedron, and again a little aside; others turned over, hidden, flat, with two corners at one place, with one that is nowhere.
+/// A tetrahedron, and again a little aside; others turned over, hidden, flat, with two corners at one place, with one
+/// that is nowhere.
 const ODD: &str = r#"<VTKFile type="UnstructuredGrid"><UnstructuredGrid><Piece NumberOfPoints="17" NumberOfCells="8">
     <CellData><DataArray type="UInt8" Name="vtkGhostType" format="ascii">0 0 0 1 0 0 0 0</DataArray></CellData>
     <Points><DataArray type="Float64" NumberOfComponents="3" format="ascii">0 0 0 1 0 0 0 1 0 0 0 1

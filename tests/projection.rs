@@ -1,6 +1,7 @@
 //! The projection engine against the judge, and each of its published faults against its cure.
 //!
-//! Order by depth is right for some meshes only, so pictures of one colour are judged: of these the order changes nothing.
+//! Order by depth is right for some meshes only, so pictures of one colour are judged: of these the order changes
+//! nothing.
 
 #![allow(
     clippy::expect_used,
@@ -123,7 +124,8 @@ fn thin() -> (Scene, View) {
     (scene, perspective(dvec3(1.0, 2.0, 5.0), 25.0))
 }
 
-/// The same, so faint that most of a cell is less than what 8 bits can tell; white, so that colours are rounded as opacities are.
+/// The same, so faint that most of a cell is less than what 8 bits can tell; white, so that colours are rounded as
+/// opacities are.
 fn faint() -> (Scene, View) {
     let (mut scene, view) = thin();
     let [lo, hi] = scene.field.range(0);

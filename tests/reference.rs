@@ -13,8 +13,8 @@ use halite::view::{Blend, Camera, ClippingPlane, DepthBuffer, DepthKind, Project
 
 const TETRA: u8 = 10;
 
-/// `n` unit cubes, the i-th at z in [i·step, i·step + 1], each split into six tetrahedra around its diagonal and each with
-/// its own points. `value(cube, position)` gives the tuples of a point field.
+/// `n` unit cubes, the i-th at z in [i·step, i·step + 1], each split into six tetrahedra around its diagonal and each
+/// with its own points. `value(cube, position)` gives the tuples of a point field.
 fn cubes<const N: usize>(n: u32, step: f64, value: impl Fn(u32, DVec3) -> [f64; N]) -> (Mesh, Tetrahedra, Field) {
     let (mut points, mut values, mut corners, mut cell) = (vec![], vec![], vec![], vec![]);
     for cube in 0..n {

@@ -1,4 +1,5 @@
-//! Tables in both engines: pictures by each form against the exact ones, and against the oracle's where its scenes are there.
+//! Tables in both engines: pictures by each form against the exact ones, and against the oracle's where its scenes are
+//! there.
 
 #![allow(
     clippy::expect_used,
@@ -135,7 +136,8 @@ fn both_engines_draw_with_each_form() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-/// Tables that the device builds draw what those do that it is handed; and after an edit the exact frame comes first, as ever.
+/// Tables that the device builds draw what those do that it is handed; and after an edit the exact frame comes first,
+/// as ever.
 #[test]
 fn devices_build_what_they_draw_with() {
     let (scene, other) = (waves(Emission::Chromatic), waves(Emission::Direct { scale: 0.4 }));

@@ -1,7 +1,7 @@
 //! The engines against the judge: every generated mesh with every kind of transfer function, field and view.
 //!
-//! Each test draws one mesh with every look in turn; views and fields pass by at other strides, so that all combinations
-//! come up in the end (HALITE_LONG=1). A wrong neighbour, order, entry, clip, unit or knot shows here.
+//! Each test draws one mesh with every look in turn; views and fields pass by at other strides, so that all
+//! combinations come up in the end (HALITE_LONG=1). A wrong neighbour, order, entry, clip, unit or knot shows here.
 
 #![allow(clippy::expect_used, clippy::unwrap_used, reason = "a test fails by panicking")]
 

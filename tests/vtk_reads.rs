@@ -1,5 +1,5 @@
-//! What Halite reads from a file is what VTK reads, value by value: from files that VTK writes here, and from others where they
-//! are at hand. Needs a Python with VTK 9; with HALITE_REQUIRE_VTK=1 it fails where there is none.
+//! What Halite reads from a file is what VTK reads, value by value: from files that VTK writes here, and from others
+//! where they are at hand. Needs a Python with VTK 9; with HALITE_REQUIRE_VTK=1 it fails where there is none.
 
 #![allow(
     clippy::unwrap_used,
@@ -67,8 +67,8 @@ fn floats(values: &Values) -> Vec<f64> {
     (0..values.len()).map(|i| values.get(i)).collect()
 }
 
-/// What differs between a mesh and a file's part of the dump. Unless `exact`, there may be more arrays: VTK keeps one of those with
-/// one name, and of lists of pieces only what the list names.
+/// What differs between a mesh and a file's part of the dump. Unless `exact`, there may be more arrays: VTK keeps one
+/// of those with one name, and of lists of pieces only what the list names.
 fn differences(mesh: &Mesh, dump: &[(Vec<String>, Vec<u8>)], exact: bool) -> Vec<String> {
     let mut wrong = vec![];
     let mut check = |what: &str, ok: bool| {

@@ -140,8 +140,8 @@ enum class Level
   Error
 };
 
-/// Sends the log to `sink` from now on. It is called at the end of those calls of this library that logged something, on
-/// their thread. An empty sink ends that.
+/// Sends the log to `sink` from now on. It is called at the end of those calls of this library that logged something,
+/// on their thread. An empty sink ends that.
 HALITE_EXPORT void setLog(std::function<void(Level, const std::string&)> sink);
 
 /// The version of the library, such as "0.1.0".
@@ -154,17 +154,18 @@ public:
   /// Reads a .vtu or legacy .vtk file.
   static Mesh open(const std::string& path);
 
-  /// Makes a mesh of `points` (x, y, z for each; any type of number) and cells as vtkCellArray keeps them: `types` has VTK's
-  /// type of each cell, cell i has the points `connectivity[offsets[i]]` up to `connectivity[offsets[i + 1]]`, so that there
-  /// is one offset more than cells. Offsets and connectivity are integers of 32 or 64 bits.
+  /// Makes a mesh of `points` (x, y, z for each; any type of number) and cells as vtkCellArray keeps them: `types` has
+  /// VTK's type of each cell, cell i has the points `connectivity[offsets[i]]` up to `connectivity[offsets[i + 1]]`, so
+  /// that there is one offset more than cells. Offsets and connectivity are integers of 32 or 64 bits.
   Mesh(Numbers points, Numbers types, Numbers offsets, Numbers connectivity);
 
   Mesh(Mesh&&) noexcept;
   Mesh& operator=(Mesh&&) noexcept;
   ~Mesh();
 
-  /// Says what faces the polyhedra (VTK's type 42) among the cells have; without it they are not drawn. Cell i has the faces
-  /// cells[i] to cells[i + 1] (none if it is no polyhedron), face j the points points[faces[j]] to points[faces[j + 1]].
+  /// Says what faces the polyhedra (VTK's type 42) among the cells have; without it they are not drawn. Cell i has the
+  /// faces cells[i] to cells[i + 1] (none if it is no polyhedron), face j the points points[faces[j]] to
+  /// points[faces[j + 1]].
   void addPolyhedra(Numbers cells, Numbers faces, Numbers points);
 
   /// Adds a copy of an array, in tuples of `components`. One called "vtkGhostType" says which cells and points are
@@ -197,8 +198,8 @@ enum Component : int
 {
   /// The Euclidean length of the tuple.
   Magnitude = -1,
-  /// All of them: two are a value of the colour function and one of the opacity function; four are red, green and blue (0 to 1,
-  /// or bytes) and a value of the opacity function.
+  /// All of them: two are a value of the colour function and one of the opacity function; four are red, green and blue
+  /// (0 to 1, or bytes) and a value of the opacity function.
   AllComponents = -2
 };
 
@@ -211,8 +212,8 @@ enum class OpacityConvention
   Opacity
 };
 
-/// Colour and opacity, piecewise linear between knots that ascend in the scalar; constant beyond them. Two knots at one scalar
-/// are a step.
+/// Colour and opacity, piecewise linear between knots that ascend in the scalar; constant beyond them. Two knots at one
+/// scalar are a step.
 struct TransferFunction
 {
   struct ColorKnot
@@ -259,8 +260,8 @@ struct View
   std::uint32_t width = 640;
   std::uint32_t height = 480;
   Camera camera;
-  /// OpenGL's matrices, rows one after another, take the place of the camera if they are given: from the world to the eye, and
-  /// from there to clip coordinates. Any frustum can be had so.
+  /// OpenGL's matrices, rows one after another, take the place of the camera if they are given: from the world to the
+  /// eye, and from there to clip coordinates. Any frustum can be had so.
   const std::array<double, 16>* worldToEye = nullptr;
   const std::array<double, 16>* eyeToClip = nullptr;
   std::vector<ClippingPlane> planes;
@@ -284,12 +285,12 @@ struct Statistics
 /// The form of the ray integral, by the names that scenes have for it. Empty names mean the first that is said here.
 struct Integral
 {
-  /// "exact"; "volume", "polynomial" or "cylindrical": a pre-integrated table; or "auto": exact, or a table where functions have
-  /// so many knots that it is faster. Tables are for fields of one component.
+  /// "exact"; "volume", "polynomial" or "cylindrical": a pre-integrated table; or "auto": exact, or a table where
+  /// functions have so many knots that it is faster. Tables are for fields of one component.
   std::string form;
-  /// Texels: values in front, values behind, and lengths of a volume or planes of a cylinder. At least 2 x 2 x 3 in a volume; as
-  /// many in front as behind in the others; a multiple of 4 planes; polynomials have as many layers as their degree wants. All 0:
-  /// as many as suit the function. At most 1 GiB at 16 bytes each.
+  /// Texels: values in front, values behind, and lengths of a volume or planes of a cylinder. At least 2 x 2 x 3 in a
+  /// volume; as many in front as behind in the others; a multiple of 4 planes; polynomials have as many layers as their
+  /// degree wants. All 0: as many as suit the function. At most 1 GiB at 16 bytes each.
   std::array<std::int32_t, 3> table = { 0, 0, 0 };
   /// Of a volume: "log-normalised", "log" or "uniform".
   std::string lengths;
@@ -310,8 +311,8 @@ struct Settings
   std::size_t threads = 0;
   /// "auto", "cpu", or a GPU by index, UUID or part of its name.
   std::string device;
-  /// "auto" or "traverse": rays walk from cell to cell. "project": cells are sorted by depth and blended; it needs a device for
-  /// graphics (not "cpu"), refuses the maximum, and its order is right for some meshes only.
+  /// "auto" or "traverse": rays walk from cell to cell. "project": cells are sorted by depth and blended; it needs a
+  /// device for graphics (not "cpu"), refuses the maximum, and its order is right for some meshes only.
   std::string engine;
   /// See Renderer::setIntegral.
   Integral integral;
@@ -321,8 +322,8 @@ struct Settings
 class HALITE_EXPORT Renderer
 {
 public:
-  /// Told the share that is done, in [0, 1], every 20 ms while a frame is drawn, on the thread that called; false ends it. It may
-  /// throw: render() then throws an Error with what it said.
+  /// Told the share that is done, in [0, 1], every 20 ms while a frame is drawn, on the thread that called; false ends
+  /// it. It may throw: render() then throws an Error with what it said.
   using Progress = std::function<bool(double)>;
   /// A matrix from the mesh's coordinates to the world, rows one after another; affine.
   using Matrix = std::array<double, 16>;
@@ -332,10 +333,11 @@ public:
   Renderer& operator=(Renderer&&) noexcept;
   ~Renderer();
 
-  /// Draws `mesh`, which is not needed afterwards; the field must be set again. Lengths along rays are lengths in the world.
+  /// Draws `mesh`, which is not needed afterwards; the field must be set again. Lengths along rays are lengths in the
+  /// world.
   void setMesh(const Mesh& mesh, const Matrix* matrix = nullptr);
-  /// Moves the points of the mesh, or only its matrix, and keeps all else. False if that cannot be, because the new matrix makes
-  /// a mirror image of the old one: then set the mesh again.
+  /// Moves the points of the mesh, or only its matrix, and keeps all else. False if that cannot be, because the new
+  /// matrix makes a mirror image of the old one: then set the mesh again.
   bool movePoints(Numbers points, const Matrix* matrix = nullptr);
   bool movePoints(const Mesh& mesh, const Matrix* matrix = nullptr);
   /// Draws an array of the mesh.
@@ -343,11 +345,11 @@ public:
   /// Draws numbers, in tuples of `components`, one for each point or cell of the mesh.
   void setField(const std::string& name, Association, std::size_t components, int component, Numbers);
   void setTransferFunction(const TransferFunction&);
-  /// Integrates in another form from the next frame on, which waits for its table if one is named. Where the transfer function
-  /// alone changes, frames are exact until the new table is built, which happens meanwhile.
+  /// Integrates in another form from the next frame on, which waits for its table if one is named. Where the transfer
+  /// function alone changes, frames are exact until the new table is built, which happens meanwhile.
   void setIntegral(const Integral&);
-  /// Draws into `pixels`: linear premultiplied red, green, blue and opacity of each pixel, row by row. False if `progress` ended
-  /// it; `pixels` are then as they were.
+  /// Draws into `pixels`: linear premultiplied red, green, blue and opacity of each pixel, row by row. False if
+  /// `progress` ended it; `pixels` are then as they were.
   bool render(const View& view, float* pixels, const Progress& progress = {});
 
   Statistics statistics() const;
@@ -357,8 +359,8 @@ private:
   std::unique_ptr<Inner> Data;
 };
 
-/// Writes `pixels` as render() makes them (row 0 uppermost) to a .png, .exr or .npy file. A .png shows them over `background`, or has
-/// an alpha channel without one.
+/// Writes `pixels` as render() makes them (row 0 uppermost) to a .png, .exr or .npy file. A .png shows them over
+/// `background`, or has an alpha channel without one.
 HALITE_EXPORT void saveImage(const std::string& path, std::uint32_t width, std::uint32_t height, const float* pixels,
   const std::array<float, 3>* background = nullptr);
 

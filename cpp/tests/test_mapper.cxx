@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-// A program that asks for VTK's mapper and, linked with the module, gets Halite's. One cube with a tent of opacity, of which
-// VTK's own draws nothing.
+// A program that asks for VTK's mapper and, linked with the module, gets Halite's. One cube with a tent of opacity, of
+// which VTK's own draws nothing.
 #include "expect.h"
 
 #include "vtkCamera.h"

@@ -27,8 +27,8 @@ struct Content
   // What each of these depends on.
   Key SettingsKey, IntegralKey, MeshKey, PlacementKey, FieldKey, FunctionKey;
 
-  // What a volume shows of a grid by `array`, of which `cellFlag` says what vtkAbstractMapper::GetScalars does. Throws if there is
-  // no array, or VTK has no meaning for it.
+  // What a volume shows of a grid by `array`, of which `cellFlag` says what vtkAbstractMapper::GetScalars does. Throws
+  // if there is no array, or VTK has no meaning for it.
   Content(const halite::Settings& settings, vtkUnstructuredGridBase* grid, vtkDataArray* array, int cellFlag,
     vtkVolume* volume, halite::OpacityConvention convention, Functions::Cache& functions);
 

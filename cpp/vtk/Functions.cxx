@@ -140,8 +140,8 @@ std::vector<Knot> Sample(vtkPiecewiseFunction* function)
 // Values of an interval, both ends among them.
 const std::size_t Samples = 2049;
 
-// A function's values between its nodes. Where VTK looks for the way from one colour to the next, which takes a fifth of a second,
-// it does so anew for each value, but once for a table.
+// A function's values between its nodes. Where VTK looks for the way from one colour to the next, which takes a fifth
+// of a second, it does so anew for each value, but once for a table.
 std::vector<std::vector<Value>> TablesOf(vtkColorTransferFunction* function, const std::vector<double>& nodes)
 {
   std::vector<std::vector<Value>> tables;

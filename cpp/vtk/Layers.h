@@ -25,7 +25,8 @@ public:
   void Clear() { this->All.clear(); }
 
 private:
-  // Premultiplied pixels of rays that end at these depths. Of each pixel of the window, which of these is its own; -1 is none.
+  // Premultiplied pixels of rays that end at these depths. Of each pixel of the window, which of these is its own; -1
+  // is none.
   struct Layer
   {
     std::vector<int> Places;

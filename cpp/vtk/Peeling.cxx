@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-// The pass means its questions for the shaders of VTK's own mapper of image data: it has textures of depths, names them in a
-// shader's declarations, and sets them as that shader's parameters. A shader here writes the depths out instead.
+// The pass means its questions for the shaders of VTK's own mapper of image data: it has textures of depths, names them
+// in a shader's declarations, and sets them as that shader's parameters. A shader here writes the depths out instead.
 #include "Peeling.h"
 
 #include "OpenGLNumbers.h"
@@ -61,9 +61,9 @@ const char* const Questions[] = {
   "}\n",
 };
 
-// Where a volume is the first of a stage its picture is what is written; others go over it, as they come from far to near. What lies
-// before all layers may be kept until the first layer was drawn: VTK's layers have 8 bits, and what is written less often is rounded
-// less often.
+// Where a volume is the first of a stage its picture is what is written; others go over it, as they come from far to
+// near. What lies before all layers may be kept until the first layer was drawn: VTK's layers have 8 bits, and what is
+// written less often is rounded less often.
 const char* const Answers[] = {
   "//VTK::System::Dec\n"
   "//VTK::Output::Dec\n"

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-// A volume among the layers of translucent surfaces: what VTK's dual depth peeling asks of a volume, and how it is answered.
+// A volume among the layers of translucent surfaces: what VTK's dual depth peeling asks of a volume, and how it is
+// answered.
 #pragma once
 
 #include "vtkHaliteCompatibility.h"
@@ -25,8 +26,8 @@ struct Part
   float Start, End;
 };
 
-// The two parts of a ray that one peel draws: that behind the layer which was peeled from the front, and that before the one
-// which was peeled from behind.
+// The two parts of a ray that one peel draws: that behind the layer which was peeled from the front, and that before
+// the one which was peeled from behind.
 struct Parts
 {
   Part Front, Back;
@@ -49,7 +50,8 @@ public:
   // Whether what was asked for last lies before and behind all layers; it starts a frame.
   bool IsOutside() const { return this->Now == Outside; }
 
-  // Gives it the pictures of these parts, premultiplied. What was kept goes before all layers that were drawn until now.
+  // Gives it the pictures of these parts, premultiplied. What was kept goes before all layers that were drawn until
+  // now.
   void Answer(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolume* volume, vtkTextureObject* kept,
     vtkTextureObject* front, vtkTextureObject* back);
 

@@ -35,7 +35,8 @@ public:
 
   vtkOpenGLRenderWindow* GetWindow() const;
 
-  // The depths of what is drawn in the viewport, row 0 lowest; `across` x `down` of them, at the middles of as many fields.
+  // The depths of what is drawn in the viewport, row 0 lowest; `across` x `down` of them, at the middles of as many
+  // fields.
   static void ReadDepths(
     vtkOpenGLRenderWindow* window, const Viewport& viewport, int across, int down, std::vector<float>& depths);
 

@@ -99,7 +99,8 @@ void vtkHaliteMapper::Render(vtkRenderer* renderer, vtkVolume* volume)
   {
     return;
   }
-  // Depth peeling asks for parts of rays, in peels. A maximum has no parts, so its picture goes over the finished scene, once.
+  // Depth peeling asks for parts of rays, in peels. A maximum has no parts, so its picture goes over the finished
+  // scene, once.
   const bool isMaximum = this->GetBlendMode() == vtkUnstructuredGridVolumeMapper::MAXIMUM_INTENSITY_BLEND;
   vtkOpenGLRenderPass* pass = nullptr;
   if (!inner.DrawsLate && IsPeeled(volume))

@@ -191,7 +191,8 @@ bool vtkHaliteMapper::Internals::Peel(
   std::vector<float> kept, front = frame.Layers.PictureOf(parts, &Parts::Front);
   const std::vector<float> back = frame.Layers.PictureOf(parts, &Parts::Back);
   kept.swap(frame.Kept);
-  // VTK's layers have 8 bits, and what is written less often is rounded less often. Other volumes would have to go between.
+  // VTK's layers have 8 bits, and what is written less often is rounded less often. Other volumes would have to go
+  // between.
   if (isOutside && volume->GetMapper() == &this->Self && renderer->GetVolumes()->GetNumberOfItems() == 1 &&
     renderer->GetMaximumNumberOfPeels() > 0)
   {

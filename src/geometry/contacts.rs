@@ -1,7 +1,8 @@
 //! Where the boundary of a mesh touches or enters other cells: what `info` tells of a mesh, and no frame needs.
 //!
-//! From a place on each boundary face a line goes outwards. What it leaves and enters further on adds up to the number of cells
-//! outside the face there (the winding number of the boundary): none, or one that touches it, or one that it lies in.
+//! From a place on each boundary face a line goes outwards. What it leaves and enters further on adds up to the number
+//! of cells outside the face there (the winding number of the boundary): none, or one that touches it, or one that it
+//! lies in.
 
 use super::Geometry;
 use super::boundary::LEAF;

@@ -6,7 +6,8 @@ use crate::error::Result;
 use crate::geometry::{Geometry, Values};
 use glam::DVec3;
 
-/// An element of [`points`]: each coordinate is the sum of two. They are read in pairs, as devices in software take each read for itself.
+/// An element of [`points`]: each coordinate is the sum of two. They are read in pairs, as devices in software take
+/// each read for itself.
 pub(crate) const POINT: &str = "\
 struct Point { xy: vec2f, z_and_low_x: vec2f, low_yz: vec2f }
 fn high_of(p: Point) -> vec3f { return vec3f(p.xy, p.z_and_low_x.x); }

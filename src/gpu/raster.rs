@@ -19,8 +19,8 @@ impl Texture {
     /// A texture of one level.
     ///
     /// # Errors
-    /// [`Error::Device`] if the device knows none so large, [`Error::Memory`] if the budget does not allow it, and those of
-    /// [`Gpu::check`].
+    /// [`Error::Device`] if the device knows none so large, [`Error::Memory`] if the budget does not allow it, and
+    /// those of [`Gpu::check`].
     pub(crate) fn new(
         gpu: &Gpu,
         label: &str,
@@ -215,8 +215,8 @@ pub(crate) fn compute(
     })
 }
 
-/// A pipeline of the entry points "vertex" and "fragment" that draws triangles of vertices with these `attributes`, each `stride` bytes
-/// apart in every binding, onto one picture, but for those `culled`.
+/// A pipeline of the entry points "vertex" and "fragment" that draws triangles of vertices with these `attributes`,
+/// each `stride` bytes apart in every binding, onto one picture, but for those `culled`.
 pub(crate) fn render(
     gpu: &Gpu,
     module: &wgpu::ShaderModule,

@@ -59,8 +59,8 @@ impl Sorter {
         4 * (items + start) as u64 <= most
     }
 
-    /// The numbers of the items of `keys`, which is as long as `items` and is overwritten, by ascending key; equal ones in
-    /// sequence. They begin at place `start` of the buffer; how many they are comes with it.
+    /// The numbers of the items of `keys`, which is as long as `items` and is overwritten, by ascending key; equal ones
+    /// in sequence. They begin at place `start` of the buffer; how many they are comes with it.
     ///
     /// # Errors
     /// Those of [`Gpu::wait`] and [`Buffer::new`].

@@ -38,7 +38,8 @@ pub(crate) fn declarations(group: u32, first: u32) -> String {
     (first..).zip(names).map(|(binding, name)| format!("@group({group}) @binding({binding}) {name};\n")).collect()
 }
 
-/// The constants that a program with this table is compiled for; `per_cell` if a cylinder's planes are known from the cell.
+/// The constants that a program with this table is compiled for; `per_cell` if a cylinder's planes are known from the
+/// cell.
 pub(crate) fn constants(table: Option<&Lookup>, per_cell: bool) -> String {
     let mut text = String::new();
     let forms = ["EXACT", "UNIFORM", "LOG", "LOG_NORMALISED", "POLYNOMIAL", "CYLINDRICAL"];
@@ -95,8 +96,8 @@ pub(crate) struct Held {
 }
 
 impl Held {
-    /// Hands over `table` unless it is there, or has the device build it of the function that `function` tells; without one, the smallest
-    /// that can be bound.
+    /// Hands over `table` unless it is there, or has the device build it of the function that `function` tells; without
+    /// one, the smallest that can be bound.
     ///
     /// # Errors
     /// Those of [`OnDevice::holding`] and [`OnDevice::building`].
@@ -169,8 +170,8 @@ impl OnDevice {
     /// Hands `table` over.
     ///
     /// # Errors
-    /// [`Error::Device`] if the device does not filter such texels or has no textures so large, and those of [`Gpu::check`] and
-    /// [`Buffer::new`].
+    /// [`Error::Device`] if the device does not filter such texels or has no textures so large, and those of
+    /// [`Gpu::check`] and [`Buffer::new`].
     pub(crate) fn holding(gpu: &Gpu, table: &Lookup) -> Result<Self> {
         let format = texel_format(gpu, table.choice().texels)?;
         let on_device = Self::empty(gpu, table, format)?;
@@ -199,8 +200,8 @@ impl OnDevice {
         Ok(on_device)
     }
 
-    /// Has the device build `table` of the function `exact`, which `function` tells it. Does not wait for it: what the device is asked to do
-    /// later comes after.
+    /// Has the device build `table` of the function `exact`, which `function` tells it. Does not wait for it: what the
+    /// device is asked to do later comes after.
     ///
     /// # Errors
     /// [`Error::Device`] if it cannot build such a table or has no bindings so large, and those of [`Self::holding`].
@@ -390,8 +391,8 @@ impl Tiles {
         if !self.packed {
             return plane(tile).into();
         }
-        // S_f = t + s of the first quarter ends at 1, t − s of the last at 0. What is between the last of these planes and the next
-        // needs more of it.
+        // S_f = t + s of the first quarter ends at 1, t − s of the last at 0. What is between the last of these planes
+        // and the next needs more of it.
         let whole = tile >= planes.planes / 4;
         let second = if tile == 0 || whole { tile } else { planes.planes - tile };
         let (first, second) = (plane(tile), plane(second));

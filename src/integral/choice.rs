@@ -12,8 +12,8 @@ pub struct Choice {
     pub form: Form,
     /// What a volume holds, and for which lengths.
     pub lengths: Kind,
-    /// Texels: values in front, values behind, and lengths of a volume or planes of a cylinder; those of polynomials are their
-    /// degree's. Values in front and behind are as many but for volumes. Without: [`Choice::size`].
+    /// Texels: values in front, values behind, and lengths of a volume or planes of a cylinder; those of polynomials
+    /// are their degree's. Values in front and behind are as many but for volumes. Without: [`Choice::size`].
     pub table: Option<[u32; 3]>,
     /// Of polynomials, from 1 to 8: Guthe et al. (2002) have 1, 2 and 4.
     pub degree: u32,
@@ -21,8 +21,8 @@ pub struct Choice {
     pub alpha: Alpha,
     /// How a cylinder's planes are stored and read.
     pub planes: Planes,
-    /// Which of a cylinder's planes serve a fragment is known from its cell: true in parallel views, where it is always done,
-    /// and an approximation in others. For interpolated fragments of the projection engine.
+    /// Which of a cylinder's planes serve a fragment is known from its cell: true in parallel views, where it is always
+    /// done, and an approximation in others. For interpolated fragments of the projection engine.
     pub per_cell: bool,
     /// What a table's texels are.
     pub texels: Texels,
@@ -50,7 +50,8 @@ impl Default for Choice {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Form {
-    /// The exact integral, or a table where functions have so many knots that a look-up is faster: [`Choice::resolved`].
+    /// The exact integral, or a table where functions have so many knots that a look-up is faster:
+    /// [`Choice::resolved`].
     Auto,
     /// The exact integral.
     #[default]
@@ -116,8 +117,8 @@ pub enum Texels {
     Unorm8,
 }
 
-/// Where tables are built that a device looks up. Devices build tables of 32-bit floats, with as many values behind as in front, and not
-/// [`Planes::Packed`]; others are always built on the host.
+/// Where tables are built that a device looks up. Devices build tables of 32-bit floats, with as many values behind as
+/// in front, and not [`Planes::Packed`]; others are always built on the host.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Build {
@@ -142,12 +143,12 @@ impl Choice {
         Choice { form, ..Choice::default() }
     }
 
-    /// [`Form::Auto`] decided; other forms stay. `knots` is the number of knots that the values in the mean cell span, of `all`
-    /// that the function has.
+    /// [`Form::Auto`] decided; other forms stay. `knots` is the number of knots that the values in the mean cell span,
+    /// of `all` that the function has.
     ///
     /// The exact integral takes time that grows with the knots which a segment crosses, and a look-up does not: up to
-    /// [`FEW_KNOTS`] in the mean cell it is exact, beyond it is a table of polynomials, the smallest form for as many values. A
-    /// table needs about two texels for each knot, so that functions of more than 512 stay exact too.
+    /// [`FEW_KNOTS`] in the mean cell it is exact, beyond it is a table of polynomials, the smallest form for as many
+    /// values. A table needs about two texels for each knot, so that functions of more than 512 stay exact too.
     pub fn resolved(self, knots: f64, all: usize) -> Self {
         if self.form != Form::Auto {
             return self;
@@ -156,8 +157,8 @@ impl Choice {
         Choice { form, ..self }
     }
 
-    /// Texels along each axis, for a function of so many knots; the last is that of lengths, coefficients or planes. Volumes of
-    /// uniform lengths may be given others, by the bound on their error: [`super::table::size`].
+    /// Texels along each axis, for a function of so many knots; the last is that of lengths, coefficients or planes.
+    /// Volumes of uniform lengths may be given others, by the bound on their error: [`super::table::size`].
     pub fn size(&self, knots: usize) -> [u32; 3] {
         let values = |low: u32, high: u32| (2 * knots as u32).next_power_of_two().clamp(low, high);
         match (self.form, self.table) {

@@ -209,9 +209,9 @@ pub(super) fn compile<R: Real>(
     Knots::new(knots)
 }
 
-/// Extinction per world unit of length as a piecewise linear function of the field, by the transfer function's convention;
-/// `opaque` on every stretch where opacity is 1 or more. A value that reaches 1 alone lets light through: the logarithm's
-/// integral is finite there.
+/// Extinction per world unit of length as a piecewise linear function of the field, by the transfer function's
+/// convention; `opaque` on every stretch where opacity is 1 or more. A value that reaches 1 alone lets light through:
+/// the logarithm's integral is finite there.
 pub(super) fn extinction(transfer: &TransferFunction, opaque: f64) -> Vec<(f64, [f64; 1])> {
     let knots = transfer.opacity();
     if transfer.convention() == Convention::Extinction {

@@ -6,8 +6,8 @@ use super::{Exact, Light, opacity_of_depth, table};
 use crate::error::{Error, Result};
 use crate::field;
 
-/// What bounds the error of a uniform volume whose size nobody said, where a table of 256 x 256 x 128 can hold that. It is the worst
-/// case, some 20 times what is seen.
+/// What bounds the error of a uniform volume whose size nobody said, where a table of 256 x 256 x 128 can hold that. It
+/// is the worst case, some 20 times what is seen.
 const UNIFORM_ERROR: f64 = 0.02;
 
 /// What bounds the error of other tables that are smaller than the number of knots asks for.
@@ -52,7 +52,8 @@ pub struct Integral<'a> {
 }
 
 impl Lookup {
-    /// Builds the table that `choice` says, for segments of up to `longest` normalised units, on the current rayon pool.
+    /// Builds the table that `choice` says, for segments of up to `longest` normalised units, on the current rayon
+    /// pool.
     ///
     /// # Errors
     /// Those of [`Choice::check`]; [`Error::Render`] for fields of several components, of which tables have no room.
@@ -193,7 +194,8 @@ impl Lookup {
         }
     }
 
-    /// Premultiplied colour and opacity of a segment, in normalised units: the twin of `tabulated` in `shaders/table.wgsl`.
+    /// Premultiplied colour and opacity of a segment, in normalised units: the twin of `tabulated` in
+    /// `shaders/table.wgsl`.
     pub fn look_up(&self, front: f32, back: f32, length: f32) -> [f32; 4] {
         let (f, b) = (front * 0.5 + 0.5, back * 0.5 + 0.5);
         match &self.stored {

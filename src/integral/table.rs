@@ -1,7 +1,8 @@
 //! Pre-integrated tables: what a segment does, looked up by its values in front and behind and its length.
 //!
-//! Each form is judged by the exact integral, and read here as a device's linear filter reads it: [`Table`] has all three
-//! parameters, [`Polynomial`] the values only, and [`Cylindrical`] planes of two parameters that hold a projected cell each.
+//! Each form is judged by the exact integral, and read here as a device's linear filter reads it: [`Table`] has all
+//! three parameters, [`Polynomial`] the values only, and [`Cylindrical`] planes of two parameters that hold a projected
+//! cell each.
 
 mod bound;
 mod closed;

@@ -1,8 +1,9 @@
 //! Data arrays of a VTK XML file: from ascii, base64 or raw bytes, packed or not, to typed numbers.
 //!
 //! Every size that a file states is checked against the bytes that it has before memory is taken. Arrays are decoded in
-//! chunks, in parallel, each chunk converted while it is in cache: an `Int64` connectivity never exists as such. What decodes
-//! deals with bytes; number types come up only where a chunk is parsed or converted, which keeps the code small.
+//! chunks, in parallel, each chunk converted while it is in cache: an `Int64` connectivity never exists as such. What
+//! decodes deals with bytes; number types come up only where a chunk is parsed or converted, which keeps the code
+//! small.
 
 use super::Progress;
 use super::number::{Kind, Number, with_kind};
@@ -61,8 +62,8 @@ pub(super) enum Data {
     Appended(u64),
 }
 
-/// Converts a chunk: gets the index of its first number, the numbers as aligned bytes in the order of this machine, and the place
-/// of the results. Says what is wrong with them, if anything.
+/// Converts a chunk: gets the index of its first number, the numbers as aligned bytes in the order of this machine, and
+/// the place of the results. Says what is wrong with them, if anything.
 pub(super) type Put<'p> = dyn Fn(usize, &[u8], &mut [u8]) -> Result<(), String> + Sync + 'p;
 
 /// The file that the arrays are in, and what its root element says of them all.
@@ -80,8 +81,8 @@ pub(super) struct Store {
     pub(super) used: AtomicU64,
 }
 
-/// How often the bytes of a file may be read into arrays: some writers let equal arrays share theirs, but what many share makes much
-/// of little.
+/// How often the bytes of a file may be read into arrays: some writers let equal arrays share theirs, but what many
+/// share makes much of little.
 const MOST_USES: u64 = 8;
 
 /// The appended data of a file.
@@ -168,8 +169,8 @@ impl Store {
         Ok(Blocks { body: bytes.after(self.word)?, total, size: CHUNK, packed: None })
     }
 
-    /// The blocks of a compressed array. Its header: number of blocks, bytes of each once unpacked, bytes of the last if it is not
-    /// full (or 0), then the packed bytes of each.
+    /// The blocks of a compressed array. Its header: number of blocks, bytes of each once unpacked, bytes of the last
+    /// if it is not full (or 0), then the packed bytes of each.
     fn packed(&self, bytes: Bytes, codec: Codec) -> Result<Blocks, Fault> {
         let count = self.words(&bytes, 1)?[0];
         if count == 0 {
@@ -263,8 +264,8 @@ impl Bytes {
         decoded.saturating_sub(self.skip)
     }
 
-    /// What follows the first `header` bytes. In base64 these may be encoded together with what follows, or on their own, which
-    /// their padding tells.
+    /// What follows the first `header` bytes. In base64 these may be encoded together with what follows, or on their
+    /// own, which their padding tells.
     fn after(mut self, header: u64) -> Result<Self, Fault> {
         let characters = header.div_ceil(3) * 4;
         let mut padding = *b"=";
@@ -361,8 +362,8 @@ impl Contents<'_> {
         result.map(|()| out).map_err(|fault| self.store.named(self.array, fault))
     }
 
-    /// Checks the array for `count` numbers. In point and cell data there may be more bytes, as some writers count wrongly (GetFEM)
-    /// and VTK does not mind.
+    /// Checks the array for `count` numbers. In point and cell data there may be more bytes, as some writers count
+    /// wrongly (GetFEM) and VTK does not mind.
     fn check(&self, count: u64) -> Result<(), Fault> {
         let Body::Blocks(blocks) = &self.body else {
             let found = self.count();

@@ -1,8 +1,8 @@
 //! Legacy .vtk files, versions 1 to 5.1, ascii or binary (VTK File Formats, "Simple Legacy Formats").
 //!
-//! vtkio parses them (`parsed`). What it cannot, or would lose, is scanned here: a file is a list of sections, each a keyword, a line
-//! that says what follows, and arrays. Nothing is skipped that has no name: what is not known is an error, as nobody could tell
-//! where it ends.
+//! vtkio parses them (`parsed`). What it cannot, or would lose, is scanned here: a file is a list of sections, each a
+//! keyword, a line that says what follows, and arrays. Nothing is skipped that has no name: what is not known is an
+//! error, as nobody could tell where it ends.
 
 mod parsed;
 mod scan;
@@ -157,8 +157,8 @@ impl Parts {
         Ok(())
     }
 
-    /// One array of field data: its name, components, tuples and type. What comes before any point or cell data is of the file, and
-    /// left out.
+    /// One array of field data: its name, components, tuples and type. What comes before any point or cell data is of
+    /// the file, and left out.
     fn field(&mut self, from: &mut Scanner<'_>, section: &mut String) -> Result<(), Fault> {
         let name = from.word("the name of an array")?;
         if name == "NULL_ARRAY" {
@@ -246,8 +246,8 @@ impl Parts {
     }
 }
 
-/// In these files a polyhedron has no points, but its faces: their number, and for each the number of its points, and these. Takes
-/// them apart; the error is the cell for which that fails.
+/// In these files a polyhedron has no points, but its faces: their number, and for each the number of its points, and
+/// these. Takes them apart; the error is the cell for which that fails.
 fn unfold(cells: Cells) -> Result<(Cells, Option<Polyhedra>), usize> {
     if !cells.types.contains(&POLYHEDRON) || cells.offsets.len() != cells.types.len() + 1 {
         return Ok((cells, None));

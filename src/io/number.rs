@@ -115,8 +115,8 @@ macro_rules! float {
 }
 float!(f32 F32, f64 F64);
 
-/// The spellings of NaN and infinity that C libraries print and Rust does not parse: `nan(0x8)`, `-nan(ind)`, `1.#QNAN`,
-/// `-1.#INF`.
+/// The spellings of NaN and infinity that C libraries print and Rust does not parse: `nan(0x8)`, `-nan(ind)`,
+/// `1.#QNAN`, `-1.#INF`.
 fn special(token: &str) -> Option<f64> {
     let lower = token.to_ascii_lowercase();
     let (sign, rest) = match lower.strip_prefix('-') {

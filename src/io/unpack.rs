@@ -25,7 +25,8 @@ impl Codec {
 
     /// The most bytes that so many packed ones can unpack to.
     pub(super) fn most(self, packed: u64) -> u64 {
-        // Deflate's and LZ4's formats bound the ratio; LZMA's coder cannot get below some thousandths of a bit per symbol.
+        // Deflate's and LZ4's formats bound the ratio; LZMA's coder cannot get below some thousandths of a bit per
+        // symbol.
         packed.saturating_mul(match self {
             Codec::Zlib => 1032,
             Codec::Lz4 => 255,
@@ -110,8 +111,8 @@ fn unpack_xz(packed: &[u8], out: &mut [u8]) -> bool {
     has_modest_dictionary(packed) && reader.read_exact(out).is_ok() && matches!(reader.read(&mut [0]), Ok(0))
 }
 
-/// Whether the first block of an .xz stream needs a dictionary no larger than that of LZMA's highest preset (The .xz File Format,
-/// sections 3.1 and 5.3.1): a decoder takes the memory before it sees any data.
+/// Whether the first block of an .xz stream needs a dictionary no larger than that of LZMA's highest preset (The .xz
+/// File Format, sections 3.1 and 5.3.1): a decoder takes the memory before it sees any data.
 fn has_modest_dictionary(packed: &[u8]) -> bool {
     // After the stream's header: size of the block's header, flags, sizes if the flags say so, then the filter.
     let Some([_, flags, rest @ ..]) = packed.get(12..) else { return false };

@@ -1,7 +1,7 @@
 //! VTK XML files of unstructured grids: `.vtu`, and `.pvtu`, which lists such.
 //!
-//! `head` reads the XML up to the numbers: which pieces and arrays there are, and where. `grid` makes one mesh of all pieces:
-//! points and data; `topology` the cells.
+//! `head` reads the XML up to the numbers: which pieces and arrays there are, and where. `grid` makes one mesh of all
+//! pieces: points and data; `topology` the cells.
 
 mod grid;
 mod head;

@@ -6,8 +6,8 @@
 //! its smallest point, whichever cell looks at it. The order is that of exact positions (x, then y, then z), so cells
 //! that do not share point indices agree too; indices only break ties.
 //!
-//! Linear cells (`linear`) are split so; cells of higher order are, through all their nodes (`curved`), and polyhedra around
-//! a point in their middle (`polyhedron`). Both may add points to those of the mesh.
+//! Linear cells (`linear`) are split so; cells of higher order are, through all their nodes (`curved`), and polyhedra
+//! around a point in their middle (`polyhedron`). Both may add points to those of the mesh.
 
 mod curved;
 mod linear;
@@ -150,8 +150,8 @@ impl Tetrahedra {
     /// Splits the cells of `mesh`, on the current rayon pool.
     ///
     /// # Errors
-    /// [`Error::Empty`] if no 3D cell is left to draw; [`Error::Mesh`] if a cell has not the number of points that its type
-    /// demands, or if there would be more than [`MAX_TETRAHEDRA`], or 2³² points.
+    /// [`Error::Empty`] if no 3D cell is left to draw; [`Error::Mesh`] if a cell has not the number of points that its
+    /// type demands, or if there would be more than [`MAX_TETRAHEDRA`], or 2³² points.
     pub fn new(mesh: &Mesh) -> Result<Self> {
         let splitter = Splitter::new(mesh);
         let n = mesh.cells().len();

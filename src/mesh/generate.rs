@@ -1,8 +1,8 @@
 //! Meshes that need no file, for the demo, tests and benchmarks. Each is the same on every machine and in every run.
 //!
-//! Lattices have `n` points along each axis of [−1, 1]³, so (n − 1)³ hexahedra; points inside are moved by up to a tenth
-//! of the spacing, those on the outside stay. Every mesh has a point array "s" and a cell array "c" of f64, of the
-//! same smooth function at points and at cell centres.
+//! Lattices have `n` points along each axis of [−1, 1]³, so (n − 1)³ hexahedra; points inside are moved by up to a
+//! tenth of the spacing, those on the outside stay. Every mesh has a point array "s" and a cell array "c" of f64, of
+//! the same smooth function at points and at cell centres.
 
 use crate::mesh::{Array, Cells, Mesh, Values};
 use glam::{DVec3, dvec3};

@@ -1,7 +1,7 @@
 //! Order by depth: a stable radix sort, parallel, of one key for each cell.
 //!
-//! A key is a number without sign that falls as the cell's depth rises, so that ascending keys are back to front. Cells of equal keys
-//! stay as they are stored, so that every run draws the same.
+//! A key is a number without sign that falls as the cell's depth rises, so that ascending keys are back to front. Cells
+//! of equal keys stay as they are stored, so that every run draws the same.
 
 use super::{Provenance, VisibilityOrder};
 use rayon::prelude::*;

@@ -118,8 +118,8 @@ fn ends(view: &View, fan: &Fan, scale: f64) -> Vec<f32> {
     pixels.into_par_iter().map(end).collect()
 }
 
-/// For each of [`FILLED`] + 1 places that part the range of the last component, [−1, 1], equally: the number of parts below it
-/// in which something may be seen.
+/// For each of [`FILLED`] + 1 places that part the range of the last component, [−1, 1], equally: the number of parts
+/// below it in which something may be seen.
 pub(super) fn filled(exact: &Exact<f32>) -> Vec<u32> {
     // Where emission is not bound to extinction, another component may shine.
     let shines = exact.direct && exact.kind != Kind::Scalar;

@@ -81,7 +81,8 @@ impl std::fmt::Debug for Project {
 }
 
 impl Project {
-    /// Opens the device that `choice` says; with [`DeviceChoice::Auto`] the first GPU, or else the first device in software.
+    /// Opens the device that `choice` says; with [`DeviceChoice::Auto`] the first GPU, or else the first device in
+    /// software.
     ///
     /// # Errors
     /// [`Error::Device`] if there is none, or it cannot be used.
@@ -182,8 +183,8 @@ impl Project {
     /// Draws a frame; premultiplied colours, row by row.
     ///
     /// # Errors
-    /// [`Error::View`] for [`Blend::Maximum`], [`Error::Device`] if the device cannot blend into the target, and those of
-    /// [`Gpu::check`] and [`Buffer::new`].
+    /// [`Error::View`] for [`Blend::Maximum`], [`Error::Device`] if the device cannot blend into the target, and those
+    /// of [`Gpu::check`] and [`Buffer::new`].
     pub(crate) fn render<const N: usize>(
         &mut self,
         geometry: &Geometry,

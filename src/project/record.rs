@@ -1,9 +1,10 @@
 //! Records: what is drawn of each cell, as the compute stage writes it and the rasteriser's vertex stage reads it.
 //!
-//! A record has an equal part for each vertex of its triangles: what differs between vertices, and a share of the *words* that all
-//! fragments of the cell need. The vertex buffer is bound once for each part, moved by as much, so that a record's first vertex finds all
-//! words, of which triangles take the first vertex's; the others find something that nobody looks at. Vertex fetch is much
-//! faster than look-ups in a storage buffer where drivers do these lane by lane.
+//! A record has an equal part for each vertex of its triangles: what differs between vertices, and a share of the
+//! *words* that all fragments of the cell need. The vertex buffer is bound once for each part, moved by as much, so
+//! that a record's first vertex finds all words, of which triangles take the first vertex's; the others find something
+//! that nobody looks at. Vertex fetch is much faster than look-ups in a storage buffer where drivers do these lane by
+//! lane.
 
 use super::Fragments;
 
@@ -90,8 +91,8 @@ impl Layout {
         parts
     }
 
-    /// `Record` and `store`, which fills its words; `Stored`, which is what a vertex finds of it, and `Drawn`, which it hands on to
-    /// fragments; and what fragments take out of that again.
+    /// `Record` and `store`, which fills its words; `Stored`, which is what a vertex finds of it, and `Drawn`, which it
+    /// hands on to fragments; and what fragments take out of that again.
     pub(crate) fn wgsl(&self) -> String {
         let Layout { parts, words, share, values: (first, count), components, .. } = *self;
         let own = |each: &dyn Fn(usize, &str) -> String, skipped: usize| {

@@ -46,7 +46,8 @@ impl ColorMap {
     /// Reads a preset that ParaView saved (.json): the one called `preset`, or the first in the file.
     ///
     /// # Errors
-    /// [`Error::File`], [`Error::Malformed`], or [`Error::Unsupported`] for a categorical map or an unknown colour space.
+    /// [`Error::File`], [`Error::Malformed`], or [`Error::Unsupported`] for a categorical map or an unknown colour
+    /// space.
     pub fn open(path: &Path, preset: Option<&str>) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, e))?;
         let malformed = |what: String| Error::malformed(path, what);

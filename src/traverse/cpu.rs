@@ -17,8 +17,8 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 /// Width and height of the square of pixels whose rays share their search for entries.
 const TILE: u32 = 8;
 
-/// Transmittance below which a ray ends: what lies behind adds less than this times its colour to any channel. Direct emission
-/// has no such bound, and goes on as long as f32 can tell.
+/// Transmittance below which a ray ends: what lies behind adds less than this times its colour to any channel. Direct
+/// emission has no such bound, and goes on as long as f32 can tell.
 pub const fn least_light(direct: bool) -> f32 {
     if direct { f32::MIN_POSITIVE } else { 1e-6 }
 }
@@ -41,8 +41,9 @@ pub struct Counts {
     pub unfinished: u64,
 }
 
-/// Draws a frame on the current rayon pool. `pixel` turns the largest values along a ray into a premultiplied colour for
-/// [`Blend::Maximum`]; `progress` is told the share that is done, and may say that no more is wanted: the rest stays empty.
+/// Draws a frame on the current rayon pool. `pixel` turns the largest values along a ray into a premultiplied colour
+/// for [`Blend::Maximum`]; `progress` is told the share that is done, and may say that no more is wanted: the rest
+/// stays empty.
 pub fn render<const N: usize>(
     geometry: &Geometry,
     values: &Values<N>,

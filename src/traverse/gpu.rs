@@ -52,8 +52,8 @@ const UNFINISHED: f32 = -2e30;
 /// rays start from are at most [`NEAR_EYE`] away.
 const MARGIN: f32 = 2e-6;
 
-/// How well lengths along a ray are known when they come from the depths of a cell's corners, relative to the cell's extent.
-/// Lengths that come from its volume are kept within this of them.
+/// How well lengths along a ray are known when they come from the depths of a cell's corners, relative to the cell's
+/// extent. Lengths that come from its volume are kept within this of them.
 const BLUR: f32 = 5e-7;
 
 /// Up to this distance from the mesh's centre, in normalised units, rays start at the eye.

@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 
-/// The nodes of one cell in [0, 1]³, from VTK's documentation of each type: corners, then what is between which of them.
+/// The nodes of one cell in [0, 1]³, from VTK's documentation of each type: corners, then what is between which of
+/// them.
 pub(crate) struct Kind {
     pub(crate) vtk_type: u8,
     pub(crate) corners: &'static [[f64; 3]],

@@ -39,7 +39,8 @@ fn a_cell_of_every_type_is_filled_through_all_its_nodes() {
     }
 }
 
-/// Of two cells on either side of x = 0, mirror images of each other, each with its own numbering: what is between them fits.
+/// Of two cells on either side of x = 0, mirror images of each other, each with its own numbering: what is between them
+/// fits.
 #[test]
 fn neighbours_agree_on_their_face() {
     let mut random = Random::of("neighbours");

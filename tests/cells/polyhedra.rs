@@ -64,8 +64,8 @@ impl Builder {
 /// Faces of a box, outward, as corners of [0, 1]³.
 const BOX: [[usize; 4]; 6] = [[0, 4, 7, 3], [1, 2, 6, 5], [0, 1, 5, 4], [3, 7, 6, 2], [0, 3, 2, 1], [4, 5, 6, 7]];
 
-/// Coarse and fine boxes as OpenFOAM and its like have them: a coarse box is a polyhedron with four faces where it meets fine
-/// ones, and their points hang on the edges of its other faces.
+/// Coarse and fine boxes as OpenFOAM and its like have them: a coarse box is a polyhedron with four faces where it
+/// meets fine ones, and their points hang on the edges of its other faces.
 fn hanging(refined: impl Fn([i32; 3]) -> bool, to: impl Fn(DVec3) -> DVec3 + Copy) -> (Mesh, usize) {
     let n = 3;
     let mut build = Builder::new();

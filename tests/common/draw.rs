@@ -204,8 +204,8 @@ pub(crate) const LOOKS: &[Look] = &[
 ];
 
 impl Look {
-    /// How far an engine that keeps values in f32 may be from the truth: some dozens of segments are summed, and knots are
-    /// rounded by 6e-8 of the range.
+    /// How far an engine that keeps values in f32 may be from the truth: some dozens of segments are summed, and knots
+    /// are rounded by 6e-8 of the range.
     pub(crate) fn bound(&self, blend: Blend) -> f64 {
         // −ln(1 − a) is infinitely steep at 1: what a scalar is rounded by there is seen all along a cell.
         let logarithm = self.convention == Convention::Opacity && self.peak >= 1.0;

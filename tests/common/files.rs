@@ -200,8 +200,8 @@ pub(crate) fn ascii(pieces: &[Piece]) -> String {
     String::from_utf8(write(PLAIN, pieces)).unwrap()
 }
 
-/// Every way to write a file that is read. Blocks of 72 bytes hold whole numbers of any type and end with the array "v", those of
-/// 100 bytes do not, and those of 50 bytes cut numbers in two.
+/// Every way to write a file that is read. Blocks of 72 bytes hold whole numbers of any type and end with the array
+/// "v", those of 100 bytes do not, and those of 50 bytes cut numbers in two.
 pub(crate) fn styles() -> Vec<Style> {
     let mut styles = Vec::new();
     for mode in [Mode::Ascii, Mode::Inline, Mode::AppendedBase64, Mode::AppendedRaw] {

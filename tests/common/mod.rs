@@ -90,8 +90,8 @@ impl Engine {
     }
 }
 
-/// A renderer with `engine` on `HALITE_TEST_DEVICE`, or the first device. Without any there is none, which is said loudly; with
-/// `HALITE_REQUIRE_GPU=1` that is a failure.
+/// A renderer with `engine` on `HALITE_TEST_DEVICE`, or the first device. Without any there is none, which is said
+/// loudly; with `HALITE_REQUIRE_GPU=1` that is a failure.
 pub(crate) fn on_device(engine: render::Engine) -> Option<Renderer> {
     let name = std::env::var("HALITE_TEST_DEVICE").unwrap_or_else(|_| "0".into());
     match Renderer::with_engine(2, DeviceChoice::Named(name), engine) {

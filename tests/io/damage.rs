@@ -180,7 +180,8 @@ fn files_of_other_programs() {
 
 #[test]
 fn damaged_files_of_other_programs() {
-    // Damage in field data, which is not read, an unknown type of cell, and a name that is not well-formed XML do no harm.
+    // Damage in field data, which is not read, an unknown type of cell, and a name that is not well-formed XML do no
+    // harm.
     let harmless = [
         "bad_base64.vtu",
         "huge_block_length.vtu",

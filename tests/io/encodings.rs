@@ -11,8 +11,8 @@ fn every_encoding() {
     }
 }
 
-/// vtkio cannot read raw appended data, base64 in parts and blocks that cut numbers, and drops arrays whose last block is full. It
-/// must find in the other files what Halite finds.
+/// vtkio cannot read raw appended data, base64 in parts and blocks that cut numbers, and drops arrays whose last block
+/// is full. It must find in the other files what Halite finds.
 #[test]
 fn vtkio_agrees() {
     use vtkio::model::{Attribute, DataSet, Piece::Inline, VertexNumbers};

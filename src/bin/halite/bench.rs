@@ -11,8 +11,8 @@ use std::time::Instant;
 
 /// Measure how long pictures take
 ///
-/// Loads once, then draws the same view several times on the chosen device, and on each other device of this machine unless
-/// one was named. Times are medians.
+/// Loads once, then draws the same view several times on the chosen device, and on each other device of this machine
+/// unless one was named. Times are medians.
 #[derive(Args)]
 pub(crate) struct Options {
     #[command(flatten)]

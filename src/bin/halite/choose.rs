@@ -202,8 +202,9 @@ impl Sample {
         if hi > lo { [lo, hi] } else { [lo - 0.5 * lo.abs().max(1.0), hi + 0.5 * hi.abs().max(1.0)] }
     }
 
-    /// Soft bands of opacity. What fills the mesh is clearer than what is rare, so that no value hides the others; scaled
-    /// so that the mean ray has the optical depth [`DEPTH`] at a unit distance of a [`DEPTH_SOLID`]th of the mesh.
+    /// Soft bands of opacity. What fills the mesh is clearer than what is rare, so that no value hides the others;
+    /// scaled so that the mean ray has the optical depth [`DEPTH`] at a unit distance of a [`DEPTH_SOLID`]th of the
+    /// mesh.
     fn bands(&self, [lo, hi]: [f64; 2]) -> Vec<(f64, f64)> {
         let width = (hi - lo) / BANDS as f64;
         let mut share = [0.0; BANDS];

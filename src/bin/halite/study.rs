@@ -20,8 +20,8 @@ use std::path::PathBuf;
 
 /// Compare the variants of the projection engine in one picture
 ///
-/// Draws with each published variant and its cure (Kraus, Qiao & Ebert 2004), and writes a sheet of all pictures, each above
-/// its difference from the traverse engine's, with error and time.
+/// Draws with each published variant and its cure (Kraus, Qiao & Ebert 2004), and writes a sheet of all pictures, each
+/// above its difference from the traverse engine's, with error and time.
 #[derive(Args)]
 pub(crate) struct Options {
     #[command(flatten)]

@@ -18,8 +18,9 @@ use std::time::Instant;
 
 /// Compare pre-integrated tables of a scene's transfer function
 ///
-/// Builds each published form of table for the scene's cells, in each way that is known, and tells its size, the time that took, and its
-/// errors against adaptive integration in 64 bits, over segments with any values and lengths. With --device, a device builds them too.
+/// Builds each published form of table for the scene's cells, in each way that is known, and tells its size, the time
+/// that took, and its errors against adaptive integration in 64 bits, over segments with any values and lengths. With
+/// --device, a device builds them too.
 #[derive(Args)]
 pub(crate) struct Options {
     #[command(flatten)]
@@ -39,7 +40,8 @@ pub(crate) struct Options {
     /// How much differences are magnified
     #[arg(long, value_name = "GAIN", default_value_t = 8.0)]
     gain: f32,
-    /// A sheet, a row for each line: the table at four lengths, each beside its difference from the exact integral (.png)
+    /// A sheet, a row for each line: the table at four lengths, each beside its difference from the exact integral
+    /// (.png)
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// The planes of the cylindrical table as tiles of one picture (.png)
@@ -362,8 +364,8 @@ fn tiled(table: &Cylindrical) -> Image {
     picture
 }
 
-/// A row for each table: at each length the table, values in front to the right and values behind downward, and its difference from
-/// the exact integral times `gain`.
+/// A row for each table: at each length the table, values in front to the right and values behind downward, and its
+/// difference from the exact integral times `gain`.
 fn sheet(rows: &[Row], exact: &Exact<f64>, longest: f64, gain: f32) -> Image {
     let step = SIDE + MARGIN;
     let size = [2 * LENGTHS.len() * step + MARGIN, rows.len() * step + MARGIN];

@@ -87,7 +87,8 @@ fn devices_look_up_as_f64_does() {
                 let table = Lookup::new(&exact(emission), &choice, 2.0).unwrap();
                 let got = looked_up(&gpu, &table, emission != Emission::Chromatic, &segments);
                 let worst = worst(&table, &segments, &got);
-                // Filters of real devices round their weights to 8 bits; llvmpipe's of 8-bit texels round what they mix, too.
+                // Filters of real devices round their weights to 8 bits; llvmpipe's of 8-bit texels round what they
+                // mix, too.
                 let bound = match (gpu.adapter.kind == "CPU", texels) {
                     (_, Texels::Unorm8) => 5e-2,
                     (true, _) => 2e-5,

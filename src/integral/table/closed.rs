@@ -92,8 +92,8 @@ impl Weights {
         falling: [[0.0; AT_ONCE]; 2],
     };
 
-    /// As [`Piece::new`], both ways, for depths up to [`MILD`]. This and the next take no decisions, so that they become vector
-    /// instructions.
+    /// As [`Piece::new`], both ways, for depths up to [`MILD`]. This and the next take no decisions, so that they
+    /// become vector instructions.
     #[inline(always)]
     fn expand<const DIRECT: bool>(&mut self) {
         for q in 0..AT_ONCE {

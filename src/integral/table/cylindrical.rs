@@ -1,10 +1,11 @@
 //! The table in sheared cylinder coordinates (Röttger & Ertl 2002, section 4).
 //!
-//! Where a projected cell is thin, l = 0 and s_f = s_b: all its fragments lie on a plane through the front diagonal of the
-//! table. So planes around that diagonal are sampled, each a square of two parameters, and the two nearest are interpolated.
-//! A place is told by (a, s, t) in [0, 1]³: which plane, how far from the diagonal, and where along it; equation 9 maps it to
-//! (S_f, S_b, l), scalars in [0, 1] and l over the longest length, and equation 10 back. The mapping bends at a = ¼, ½ and ¾, so
-//! planes are there; those at a = 0 and 1 have no length and so hold nothing: they are one.
+//! Where a projected cell is thin, l = 0 and s_f = s_b: all its fragments lie on a plane through the front diagonal of
+//! the table. So planes around that diagonal are sampled, each a square of two parameters, and the two nearest are
+//! interpolated. A place is told by (a, s, t) in [0, 1]³: which plane, how far from the diagonal, and where along it;
+//! equation 9 maps it to (S_f, S_b, l), scalars in [0, 1] and l over the longest length, and equation 10 back. The
+//! mapping bends at a = ¼, ½ and ¾, so planes are there; those at a = 0 and 1 have no length and so hold nothing: they
+//! are one.
 
 use super::{between, is_scalar, light, published};
 use crate::integral::{Exact, Light};
@@ -24,8 +25,8 @@ pub struct Cylindrical {
 }
 
 impl Cylindrical {
-    /// Integrates `exact` over segments of up to `longest` normalised units, on the current rayon pool. `None` for fields of
-    /// several components, sizes less than 2, and numbers of planes that are not multiples of 4.
+    /// Integrates `exact` over segments of up to `longest` normalised units, on the current rayon pool. `None` for
+    /// fields of several components, sizes less than 2, and numbers of planes that are not multiples of 4.
     pub fn new(exact: &Exact<f64>, planes: u32, size: u32, longest: f64) -> Option<Self> {
         if !is_scalar(exact) || planes == 0 || !planes.is_multiple_of(4) || size < 2 {
             return None;
@@ -41,8 +42,8 @@ impl Cylindrical {
         Some(Cylindrical { planes, size, longest, texels })
     }
 
-    /// The same table in a time per texel that does not depend on the function. Along s, both the scalar in front and the length go on
-    /// from where the texel before has them: each texel is that one behind a slab, in closed form.
+    /// The same table in a time per texel that does not depend on the function. Along s, both the scalar in front and
+    /// the length go on from where the texel before has them: each texel is that one behind a slab, in closed form.
     pub fn closed(exact: &Exact<f64>, planes: u32, size: u32, longest: f64) -> Option<Self> {
         if !is_scalar(exact) || planes == 0 || !planes.is_multiple_of(4) || size < 2 {
             return None;

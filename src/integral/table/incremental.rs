@@ -1,8 +1,9 @@
 //! Slices from slices.
 //!
-//! A segment of twice the length is two halves that meet at the middle value: I(s_f, s_b, 2l) = I(s_f, s_m, l) ⊕ I(s_m, s_b, l). And one that is Δl longer is a
-//! slab before it: I(s_f, s_b, l + Δl) = I(s_f, s′, Δl) ⊕ I(s′, s_b, l) with s′ = s_f + (s_b − s_f) Δl/(l + Δl). Where s_m or s′ lies
-//! between two values, the slices are interpolated: that is what these constructions lose.
+//! A segment of twice the length is two halves that meet at the middle value: I(s_f, s_b, 2l) = I(s_f, s_m, l) ⊕ I(s_m,
+//! s_b, l). And one that is Δl longer is a slab before it: I(s_f, s_b, l + Δl) = I(s_f, s′, Δl) ⊕ I(s′, s_b, l) with s′
+//! = s_f + (s_b − s_f) Δl/(l + Δl). Where s_m or s′ lies between two values, the slices are interpolated: that is what
+//! these constructions lose.
 
 use super::closed;
 use super::grid::Grid;
@@ -23,8 +24,9 @@ fn mix(a: [f32; 4], b: [f32; 4], share: f32) -> [f32; 4] {
 }
 
 impl Table {
-    /// A table of premultiplied colour and opacity, whose first slice with a length is in closed form and whose others are each made of
-    /// that before, in f32. `None` as [`Table::new`], for [`Kind::LogNormalised`], and unless there are as many values behind as in front.
+    /// A table of premultiplied colour and opacity, whose first slice with a length is in closed form and whose others
+    /// are each made of that before, in f32. `None` as [`Table::new`], for [`Kind::LogNormalised`], and unless there
+    /// are as many values behind as in front.
     pub fn incremental(exact: &Exact<f64>, kind: Kind, size: [u32; 3], longest: f64) -> Option<Self> {
         let n = size[0] as usize;
         if !is_scalar(exact) || n < 3 || size[1] != size[0] || size[2] < 3 || kind == Kind::LogNormalised {
@@ -36,7 +38,8 @@ impl Table {
         let first = &done[n * n..];
         match kind {
             Kind::Uniform => {
-                // A row, all of one value behind, is made of that row of the slice before: rows need not wait for each other.
+                // A row, all of one value behind, is made of that row of the slice before: rows need not wait for each
+                // other.
                 let mut by_row: Vec<Vec<&mut [[f32; 4]]>> = (0..n).map(|_| vec![]).collect();
                 for slice in rest.chunks_exact_mut(n * n) {
                     slice.chunks_exact_mut(n).zip(&mut by_row).for_each(|(row, rows)| rows.push(row));

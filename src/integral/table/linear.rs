@@ -1,5 +1,5 @@
-//! What the separated table was compared with (Guthe et al. 2002, figure 3): a table of two parameters, for the longest segments, in
-//! which colour and opacity of shorter ones are proportional to the length.
+//! What the separated table was compared with (Guthe et al. 2002, figure 3): a table of two parameters, for the longest
+//! segments, in which colour and opacity of shorter ones are proportional to the length.
 
 use super::grid::Grid;
 use super::{between, closed, is_scalar, value};
@@ -17,8 +17,8 @@ pub struct Linear {
 }
 
 impl Linear {
-    /// Integrates `exact` over segments of `longest` normalised units, in f64. `None` for fields of several components and sizes less
-    /// than 2.
+    /// Integrates `exact` over segments of `longest` normalised units, in f64. `None` for fields of several components
+    /// and sizes less than 2.
     pub fn new(exact: &Exact<f64>, size: u32, longest: f64) -> Option<Self> {
         let texel = |at: u32| {
             super::published(exact, value(at % size, size), value(at / size, size), longest).map(|c| c as f32)

@@ -1,7 +1,7 @@
-//! Numeric integration, as Röttger & Ertl (2002, section 3) have it: the function is a list of entries, a segment is cut into n
-//! equal parts, and in each colour and extinction are those in its middle (Stein, Becker & Max 1994). They give n two ways: for all texels of a slice as many as the
-//! list has entries, times an oversampling, as graphics hardware blends them; or as a program may, at least twice as many
-//! as the segment touches.
+//! Numeric integration, as Röttger & Ertl (2002, section 3) have it: the function is a list of entries, a segment is
+//! cut into n equal parts, and in each colour and extinction are those in its middle (Stein, Becker & Max 1994). They
+//! give n two ways: for all texels of a slice as many as the list has entries, times an oversampling, as graphics
+//! hardware blends them; or as a program may, at least twice as many as the segment touches.
 
 use super::volume::{Kind, Table, length};
 use super::{grid, is_scalar, value};
@@ -17,7 +17,8 @@ pub struct Sampling {
     pub entries: u32,
     /// How many.
     pub steps: Steps,
-    /// Bits of each channel, of the list as of the sum, as frame buffers then had: to study what they cost. None: floats.
+    /// Bits of each channel, of the list as of the sum, as frame buffers then had: to study what they cost. None:
+    /// floats.
     pub bits: Option<u32>,
 }
 
@@ -70,8 +71,8 @@ fn rounded(x: f32, most: f32) -> f32 {
 }
 
 impl Table {
-    /// A table of premultiplied colour and opacity, uniform or logarithmic in length, by numeric integration in f32. `None` as
-    /// [`Table::new`], for [`Kind::LogNormalised`], and for less than 2 entries.
+    /// A table of premultiplied colour and opacity, uniform or logarithmic in length, by numeric integration in f32.
+    /// `None` as [`Table::new`], for [`Kind::LogNormalised`], and for less than 2 entries.
     pub fn sampled(exact: &Exact<f64>, kind: Kind, size: [u32; 3], longest: f64, sampling: Sampling) -> Option<Self> {
         let [w, h, n] = size;
         if !is_scalar(exact) || w < 2 || h < 2 || n < 3 || kind == Kind::LogNormalised || sampling.entries < 2 {

@@ -244,8 +244,8 @@ pub(crate) fn transfers(mut seed: u64) -> Vec<(&'static str, TransferFunction)> 
     all
 }
 
-/// The greatest difference of two lists of texels, relative to the greatest of the channel, if that is anything: opacities of f64 are
-/// 1 less what comes through, and so have no digits below 1e-16.
+/// The greatest difference of two lists of texels, relative to the greatest of the channel, if that is anything:
+/// opacities of f64 are 1 less what comes through, and so have no digits below 1e-16.
 pub(crate) fn apart_texels(got: &[[f32; 4]], want: &[[f32; 4]]) -> f32 {
     assert_eq!(got.len(), want.len());
     let most = want.iter().fold([1e-12f32; 4], |m, t| std::array::from_fn(|k| m[k].max(t[k].abs())));

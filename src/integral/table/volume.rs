@@ -1,11 +1,11 @@
-//! The table of three parameters. Röttger, Kraus & Ertl (2000) have uniform lengths. Kraus, Qiao & Ebert (2004, section 3) have logarithmic ones, in slices for
-//! 0, Δl, 2 Δl, 4 Δl, … up to l_max, with Δl = 2^−(n_r−2) l_max; their equation 1 maps a length l to the coordinate
-//! r = (max(log₂(l/Δl), 0) + min(l/Δl, 1)) / n_r + 1 / (2 n_r).
+//! The table of three parameters. Röttger, Kraus & Ertl (2000) have uniform lengths. Kraus, Qiao & Ebert (2004, section
+//! 3) have logarithmic ones, in slices for 0, Δl, 2 Δl, 4 Δl, … up to l_max, with Δl = 2^−(n_r−2) l_max; their equation
+//! 1 maps a length l to the coordinate r = (max(log₂(l/Δl), 0) + min(l/Δl, 1)) / n_r + 1 / (2 n_r).
 //!
-//! Between slices the table is interpolated linearly in r, but in thin cells colour and opacity rise linearly with l: at
-//! l = 2^(k+f) Δl they come out (1 + f) 2^−f times too great, 4.1 % on average and up to 6.1 %, however many slices there
-//! are. What hardly depends on the length has no such bias: [`Kind::LogNormalised`] keeps the mean extinction ρ̂ = −ln(1−α)/l
-//! and the colour C/α, so that α = 1 − e^{−l ρ̂}.
+//! Between slices the table is interpolated linearly in r, but in thin cells colour and opacity rise linearly with l:
+//! at l = 2^(k+f) Δl they come out (1 + f) 2^−f times too great, 4.1 % on average and up to 6.1 %, however many slices
+//! there are. What hardly depends on the length has no such bias: [`Kind::LogNormalised`] keeps the mean extinction ρ̂
+//! = −ln(1−α)/l and the colour C/α, so that α = 1 − e^{−l ρ̂}.
 
 use super::closed::{self, Both, Runs};
 use super::grid::Grid;
@@ -22,7 +22,8 @@ pub enum Kind {
     Uniform,
     /// The same for logarithmic lengths, as published.
     Log,
-    /// Colour over opacity (for direct emission: over the length that is seen) and mean extinction, for logarithmic lengths.
+    /// Colour over opacity (for direct emission: over the length that is seen) and mean extinction, for logarithmic
+    /// lengths.
     #[default]
     LogNormalised,
 }
@@ -38,8 +39,8 @@ pub struct Table {
     pub longest: f64,
     /// Emission is not multiplied by extinction.
     pub direct: bool,
-    /// Colour and opacity, or what stands for them; the value in front varies fastest, the length slowest. f32 would not change
-    /// what f64 finds, but for rounding it once.
+    /// Colour and opacity, or what stands for them; the value in front varies fastest, the length slowest. f32 would
+    /// not change what f64 finds, but for rounding it once.
     pub texels: Vec<[f32; 4]>,
 }
 
@@ -50,13 +51,14 @@ const DISTANCES: usize = 8;
 /// Optical depths beyond this are opaque, and so is a mean extinction that gives it to the thinnest slice but 0.
 pub(crate) const OPAQUE_DEPTH: f64 = 100.0;
 
-/// The piecewise linear function along one segment: extinction and colour in front and behind of each piece, and its share of
-/// the length.
+/// The piecewise linear function along one segment: extinction and colour in front and behind of each piece, and its
+/// share of the length.
 pub(super) type Pieces = Vec<([f64; 4], [f64; 4], f64)>;
 
 impl Table {
-    /// Integrates `exact` over segments of up to `longest` normalised units, on the current rayon pool. `None` for fields of
-    /// several components, of which a table has no room, and for sizes that are no table: less than 2 × 2 × 3 texels.
+    /// Integrates `exact` over segments of up to `longest` normalised units, on the current rayon pool. `None` for
+    /// fields of several components, of which a table has no room, and for sizes that are no table: less than 2 × 2 × 3
+    /// texels.
     pub fn new(exact: &Exact<f64>, kind: Kind, size: [u32; 3], longest: f64) -> Option<Self> {
         if !is_scalar(exact) || size[0] < 2 || size[1] < 2 || size[2] < 3 {
             return None;
@@ -80,8 +82,8 @@ impl Table {
         Some(Table { kind, size, longest, direct: exact.direct, texels })
     }
 
-    /// The same table, to f32, in a time per texel that does not depend on the function (`closed.rs` says how), where there are as
-    /// many values behind as in front; other sizes as [`Table::new`] has them.
+    /// The same table, to f32, in a time per texel that does not depend on the function (`closed.rs` says how), where
+    /// there are as many values behind as in front; other sizes as [`Table::new`] has them.
     pub fn closed(exact: &Exact<f64>, kind: Kind, size: [u32; 3], longest: f64) -> Option<Self> {
         if size[0] != size[1] || size[0] < 3 {
             return Self::new(exact, kind, size, longest);
@@ -95,7 +97,8 @@ impl Table {
         Some(table)
     }
 
-    /// This table of another function, in the memory that it has: faster than [`Table::closed`], as that is then known to be there.
+    /// This table of another function, in the memory that it has: faster than [`Table::closed`], as that is then known
+    /// to be there.
     pub fn rebuild(&mut self, exact: &Exact<f64>) {
         let [w, h, _] = self.size;
         if is_scalar(exact) && w == h && w > 2 {

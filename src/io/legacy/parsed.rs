@@ -7,8 +7,8 @@ use std::panic::catch_unwind;
 use vtkio::model::{Attribute, CellType, DataSet, ElementType, IOBuffer, Piece, VertexNumbers};
 
 impl Parts {
-    /// The grid in `bytes`, if vtkio parses all of it and keeps each array. It panics on some input, and stops without a word before
-    /// what it does not know: NaN in text, ids, types that are not C's, field data before the points.
+    /// The grid in `bytes`, if vtkio parses all of it and keeps each array. It panics on some input, and stops without
+    /// a word before what it does not know: NaN in text, ids, types that are not C's, field data before the points.
     pub(super) fn parsed(bytes: &[u8]) -> Option<Self> {
         let (rest, vtk) = catch_unwind(|| vtkio::parser::parse_be(bytes).ok()).ok().flatten()?;
         if !rest.is_empty() {

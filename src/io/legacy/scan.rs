@@ -157,7 +157,8 @@ impl<'a> Scanner<'a> {
         })
     }
 
-    /// Passes a string: in text a line, else bytes after their number, of which the first two bits say how long it is itself.
+    /// Passes a string: in text a line, else bytes after their number, of which the first two bits say how long it is
+    /// itself.
     fn string(&mut self) -> Result<(), Fault> {
         if self.rest().is_empty() {
             return Err("the file ends inside the array".to_owned());

@@ -64,8 +64,9 @@ impl Grid<'_> {
         Ok(joined(parts).par_chunks_exact(3).map(DVec3::from_slice).collect())
     }
 
-    /// Reads indices of any number type, all that there are or so many. `check` turns each into what is kept, or `explain` says what
-    /// is wrong with it: it gets the place of the number, and its value if it is a whole number from 0 up.
+    /// Reads indices of any number type, all that there are or so many. `check` turns each into what is kept, or
+    /// `explain` says what is wrong with it: it gets the place of the number, and its value if it is a whole number
+    /// from 0 up.
     pub(super) fn indices<U: bytemuck::Pod>(
         &self,
         piece: &Piece,

@@ -303,7 +303,8 @@ impl Head {
     }
 }
 
-/// Bytes that a tag or comment may have. It is kept in memory as a whole: without its end, that would be the rest of the file.
+/// Bytes that a tag or comment may have. It is kept in memory as a whole: without its end, that would be the rest of
+/// the file.
 const MOST_OF_A_TAG: usize = 1 << 16;
 
 /// A file of which so many bytes may be taken.

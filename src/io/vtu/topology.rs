@@ -136,8 +136,8 @@ impl Grid<'_> {
         Ok(polyhedra)
     }
 
-    /// Of a stream: for each polyhedron the number of its faces; for each face, the number of its points, and these. The other
-    /// array says where the faces of each cell end in the stream; −1 for those that are no polyhedra.
+    /// Of a stream: for each polyhedron the number of its faces; for each face, the number of its points, and these.
+    /// The other array says where the faces of each cell end in the stream; −1 for those that are no polyhedra.
     fn streamed_faces(
         &self,
         piece: &Piece,

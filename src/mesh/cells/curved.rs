@@ -1,10 +1,10 @@
 //! Cells of higher order: a lattice of linear cells through all their nodes.
 //!
-//! A hexahedron of degrees (p, q, r) becomes p · q · r linear ones, a wedge and a tetrahedron likewise (the latter leaves
-//! octahedra between its small tetrahedra: Bey, Tetrahedral Grid Refinement, 1995). Nodes are numbered as VTK does
-//! (`vtkHigherOrderHexahedron.h` and its likes). A lattice point that is no node of its own (the face centres of a serendipity
-//! cell, all but the corners of a Bézier cell) is added where the cell's shape functions put it. Its weights are the same
-//! numbers for both cells of a face, so that both put it at the same place, bit for bit.
+//! A hexahedron of degrees (p, q, r) becomes p · q · r linear ones, a wedge and a tetrahedron likewise (the latter
+//! leaves octahedra between its small tetrahedra: Bey, Tetrahedral Grid Refinement, 1995). Nodes are numbered as VTK
+//! does (`vtkHigherOrderHexahedron.h` and its likes). A lattice point that is no node of its own (the face centres of a
+//! serendipity cell, all but the corners of a Bézier cell) is added where the cell's shape functions put it. Its
+//! weights are the same numbers for both cells of a face, so that both put it at the same place, bit for bit.
 
 use super::linear::{HEXAHEDRON, OCTAHEDRON, PYRAMID, Shape, TETRA, WEDGE};
 
@@ -46,8 +46,8 @@ pub(super) fn has_degrees(vtk_type: u8) -> bool {
 }
 
 impl Recipe {
-    /// How a cell of `vtk_type` with so many points is split. `degrees` are those that the file gives, 0 for none. Otherwise: what
-    /// is wrong with the cell.
+    /// How a cell of `vtk_type` with so many points is split. `degrees` are those that the file gives, 0 for none.
+    /// Otherwise: what is wrong with the cell.
     pub(super) fn new(vtk_type: u8, points: usize, degrees: [usize; 3]) -> Result<Self, String> {
         let bezier = vtk_type >= 78;
         let expect = |n: usize| (points == n).then_some(()).ok_or(format!("with {points} points, but that has {n}"));
@@ -146,8 +146,8 @@ fn hexahedron_index([p, q, r]: [usize; 3], [i, j, k]: [usize; 3]) -> usize {
     }
 }
 
-/// A hexahedron of which the first `points` lattice points exist; the others are those of a quadratic one in the middle of
-/// faces and of the cell.
+/// A hexahedron of which the first `points` lattice points exist; the others are those of a quadratic one in the middle
+/// of faces and of the cell.
 fn hexahedron(degrees: [usize; 3], points: usize) -> Recipe {
     let [p, q, r] = degrees;
     let at = |i, j, k| hexahedron_index(degrees, [i, j, k]);
@@ -166,7 +166,8 @@ fn hexahedron(degrees: [usize; 3], points: usize) -> Recipe {
                 if face >= points {
                     recipe.nodes[face] = Node::Sum(centre.clone());
                 }
-                // Half of all faces' centres, less a quarter of the edges', and an eighth of the corners (Gordon & Hall 1973).
+                // Half of all faces' centres, less a quarter of the edges', and an eighth of the corners (Gordon & Hall
+                // 1973).
                 let parts = if face < points { vec![(face as u16, 1.0)] } else { centre };
                 parts.iter().for_each(|(i, w)| middle[*i as usize] += 0.5 * w);
             }
@@ -267,7 +268,8 @@ fn wedge(degrees: [usize; 2], points: usize) -> Recipe {
     recipe
 }
 
-/// Barycentric indices of a tetrahedron's lattice points, in VTK's order: corners, edges, faces, and inside again like that.
+/// Barycentric indices of a tetrahedron's lattice points, in VTK's order: corners, edges, faces, and inside again like
+/// that.
 fn tetrahedron_points(p: usize) -> Vec<[usize; 4]> {
     // Corner n has all of p at place n, with the last place first.
     let corner = |n: usize, p: usize| {
@@ -378,8 +380,8 @@ fn pyramid(points: usize) -> Recipe {
     Recipe { nodes, parts: pyramids.chain(tetrahedra).collect(), ..Recipe::default() }
 }
 
-/// A cell whose last point lies in its middle, and others in the middle of its faces: triangles of six points around a centre,
-/// quads of eight.
+/// A cell whose last point lies in its middle, and others in the middle of its faces: triangles of six points around a
+/// centre, quads of eight.
 fn centred(points: usize, triangles: &[(usize, [usize; 6])], quads: &[(usize, [usize; 8])]) -> Recipe {
     let middle = points - 1;
     let mut recipe = Recipe { nodes: own(points), ..Recipe::default() };

@@ -1,8 +1,9 @@
 //! Polyhedra: any number of faces, each with any number of points.
 //!
-//! A polyhedron with the faces of a linear cell is split like that. Any other becomes the tetrahedra between a point in its
-//! middle and its faces, cut into triangles. How a face is cut depends on its own points alone, so two neighbours agree, and
-//! a quad is cut like that of any cell. Nodes that hang on the edges of a face are corners of it like all others.
+//! A polyhedron with the faces of a linear cell is split like that. Any other becomes the tetrahedra between a point in
+//! its middle and its faces, cut into triangles. How a face is cut depends on its own points alone, so two neighbours
+//! agree, and a quad is cut like that of any cell. Nodes that hang on the edges of a face are corners of it like all
+//! others.
 
 use super::linear::order;
 use glam::{DMat3, DVec3};

@@ -11,7 +11,8 @@ use rayon::prelude::*;
 use std::collections::HashMap;
 use std::ops::Range;
 
-/// The cell array that tells the degrees of Lagrange and Bézier cells, and the point array that makes the latter rational.
+/// The cell array that tells the degrees of Lagrange and Bézier cells, and the point array that makes the latter
+/// rational.
 const DEGREES_ARRAY: &str = "HigherOrderDegrees";
 const WEIGHTS_ARRAY: &str = "RationalWeights";
 
@@ -178,8 +179,8 @@ impl<'a> Splitter<'a> {
         Ok(count)
     }
 
-    /// Writes the tetrahedra of the cells `range` to `corners`, and to `cell` (empty if not wanted) where they are from. Returns
-    /// the points that they add, numbered from `first` on, and how many polyhedra are crooked.
+    /// Writes the tetrahedra of the cells `range` to `corners`, and to `cell` (empty if not wanted) where they are
+    /// from. Returns the points that they add, numbered from `first` on, and how many polyhedra are crooked.
     pub(super) fn fill(
         &self,
         range: Range<usize>,

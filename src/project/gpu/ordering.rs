@@ -82,7 +82,8 @@ impl Project {
         Ok(ordered(order.len(), ORDER_CHUNK, chunks))
     }
 
-    /// The keys of all cells. If somebody wants to read them, they are shown some at a time, and only the last are returned.
+    /// The keys of all cells. If somebody wants to read them, they are shown some at a time, and only the last are
+    /// returned.
     fn classify(&self, frame: &Pass, cells: usize, mut read: Option<Reader>) -> Result<Buffer> {
         let gpu = &self.gpu;
         let program = self.program.as_ref().ok_or_else(unprepared)?;

@@ -87,7 +87,8 @@ pub(super) fn random_view(random: &mut Random, size: [u32; 2]) -> View {
     view
 }
 
-/// `mesh` with arrays "scalar", "pair" and "rgba" at its points and cells; `change` may change the i-th value at points.
+/// `mesh` with arrays "scalar", "pair" and "rgba" at its points and cells; `change` may change the i-th value at
+/// points.
 fn with_arrays(mesh: Mesh, change: impl Fn(usize, usize, f64) -> f64) -> Mesh {
     let fields = |p: DVec3| {
         let (x, y, z) = (p.x, p.y, p.z);

@@ -12,8 +12,9 @@ use crate::render::Renderer;
 use crate::view::{Blend, Camera, Projection, View};
 use glam::DVec3;
 
-/// Draws `frames` frames of each of `rounds` times eight meshes on the device and on the CPU, and compares them. Where a ray grazes
-/// the surface that a step of the function makes, the last digit of a value decides: one pixel in 100,000 may differ by more.
+/// Draws `frames` frames of each of `rounds` times eight meshes on the device and on the CPU, and compares them. Where
+/// a ray grazes the surface that a step of the function makes, the last digit of a value decides: one pixel in 100,000
+/// may differ by more.
 fn compare(rounds: usize, frames: usize, size: [u32; 2], seed: u64) {
     let Some(choice) = choice() else { return };
     let mut random = Random(seed);
