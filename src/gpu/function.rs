@@ -64,8 +64,8 @@ pub(crate) fn upload(gpu: &Gpu, exact: &Exact<f32>) -> Result<[Buffer; 3]> {
 /// Those of [`Texture::new`].
 pub(crate) fn lines(gpu: &Gpu, exact: &Exact<f32>) -> Result<Texture> {
     let mut knots = knots(exact);
-    let across = knots.len().min(LINES_ACROSS);
-    let down = knots.len().div_ceil(LINES_ACROSS);
+    let across = knots.len().clamp(1, LINES_ACROSS);
+    let down = knots.len().div_ceil(across).max(1);
     knots.resize(across * down, Knot::zeroed());
     let texels: Vec<[f32; 4]> = knots
         .chunks(across)

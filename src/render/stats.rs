@@ -1,0 +1,60 @@
+//! What a renderer tells of its work.
+
+/// What a renderer did and how long it took.
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
+pub struct Stats {
+    /// Name of the engine: "traverse" or "project".
+    pub engine: String,
+    /// "cpu" or "gpu".
+    pub device: String,
+    /// The processor or adapter.
+    pub adapter: String,
+    /// Cells of the mesh, of all types.
+    pub cells: u64,
+    /// Tetrahedra that the 3D cells were split into.
+    pub tetrahedra: u64,
+    /// Matching faces, ordering cells and building the boundary hierarchy, in ms.
+    pub faces_ms: f64,
+    /// Handing field and transfer function to the device, in ms.
+    pub upload_ms: f64,
+    /// The last frame, in ms.
+    pub frame_ms: f64,
+    /// The form of the ray integral that it was drawn with.
+    pub integral: String,
+    /// Building its table, in ms (on a device: 0 unless the frame waited for that), and what that takes, in bytes; 0
+    /// without one.
+    pub table_ms: f64,
+    /// See [`Self::table_ms`].
+    pub table_bytes: u64,
+    /// Knots of the function that the values of the mean cell have between them; 0 unless the form is chosen by that.
+    pub knots_per_cell: f64,
+    /// Tetrahedra visited in the last frame, over all rays.
+    pub steps: u64,
+    /// Rays of the last frame that had to be traced again beside an edge.
+    pub repaired_rays: u64,
+    /// Rays of the last frame that the device left to the CPU, as they take more work than its driver allows.
+    pub cpu_rays: u64,
+    /// Memory held on the device for mesh and field, in bytes.
+    pub device_bytes: u64,
+    /// What had to be handed to the device for the last frame, in bytes; 0 on the CPU.
+    pub uploaded_bytes: u64,
+    /// The last frame by the device's own clock, in ms, where it has one.
+    pub device_ms: Option<f64>,
+    /// What the projection engine did.
+    pub projection: Option<ProjectionStats>,
+}
+
+/// What the projection engine did in the last frame.
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize)]
+pub struct ProjectionStats {
+    /// Cells that were drawn; parts count, where a cell is drawn in parts.
+    pub drawn_cells: u64,
+    /// Finding the cells that are seen and sorting them, in ms; 0 if the camera stood still.
+    pub order_ms: f64,
+    /// Projecting them, by the device's own clock, in ms, where it has one.
+    pub project_ms: Option<f64>,
+    /// Drawing them, likewise.
+    pub draw_ms: Option<f64>,
+    /// Fragments that were computed, where the device counts them.
+    pub fragments: Option<u64>,
+}
