@@ -53,6 +53,20 @@ fn direction_at(xy: vec2f) -> vec3f {
     return fma(frame.direction[2].xyz, vec3f(xy.y), fma(frame.direction[1].xyz, vec3f(xy.x), frame.direction[0].xyz));
 }
 
+/// The square of the length of a ray's direction times `scale`, `offset` pixels from the one whose middle is `at`, is
+/// stretch[0] · (1, x, y) + stretch[1] · (x², xy, y²).
+fn stretch_around(at: vec2f, scale: f32) -> array<vec3f, 2> {
+    let v = direction_at(sample_of(at)) * scale;
+    let x = frame.direction[1].xyz * (frame.pixel.x * scale);
+    let y = frame.direction[2].xyz * (frame.pixel.y * scale);
+    return array<vec3f, 2>(vec3f(dot(v, v), 2.0 * dot(v, x), 2.0 * dot(v, y)), vec3f(dot(x, x), 2.0 * dot(x, y), dot(y, y)));
+}
+
+fn stretch_of(linear: vec3f, square: vec3f, offset: vec2f) -> f32 {
+    let right = linear.y + offset.x * square.x + offset.y * square.y;
+    return sqrt(linear.x + offset.x * right + offset.y * (linear.z + offset.y * square.z));
+}
+
 fn origin_at(xy: vec2f) -> vec3f {
     return fma(frame.origin[1].xyz, vec3f(xy.y), frame.origin[0].xyz * xy.x);
 }

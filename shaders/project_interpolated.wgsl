@@ -6,8 +6,10 @@
 // A record is a fan of triangles around the thickest point, which is the first vertex; the outline follows. Each vertex
 // has the values on the front and on the back (for INTERPOLATED, over w), 1/w (depth in a parallel view) of both, how
 // much they differ, and how long the ray's way is. The words of a record:
-// 0–2  the line of the function at the least value: value, slope, ends; then the longest edge, and the rank;
-// 3    the interval of that line; and which plane of a cylindrical table holds the thickest point.
+// 0    the middle of a pixel at the thickest point, and the depths between which rays are seen (t in a parallel view);
+// 1–2  the stretch of rays around it; the longest edge, and 1 in perspective views;
+// 3    the rank, and which plane of a cylindrical table holds the thickest point;
+// then the lines of the function.
 // The values: the least and the greatest.
 
 /// To pixels from the upper left corner of the image.
@@ -173,16 +175,16 @@ fn write_record(i: u32, whole: Solid, values: array<Value, 4>, piece: u32, rank:
         let reach = reach_of(p[c]);
         write_vertex(i, k + 1u, pixel_of(seen(p[c])), v[c], v[c], vec4f(reach, reach, 0.0, 0.0));
     }
-    let interval = interval_of(last_of(low));
-    let line = line_of(interval);
     var plane = 0.0;
     if PLANE_PER_CELL {
         plane = plane_of(last_of(front_value), last_of(back_value), thickness);
     }
     var words: array<vec4f, 4>;
-    words[0] = line.value;
-    words[1] = line.slope;
-    words[2] = vec4f(line.ends, longest, f32(rank & 0xffffffu));
-    words[3] = vec4f(f32(interval), plane, 0.0, 0.0);
-    store(i, words, Values(low, high));
+    let centre = floor(clamp(pixel_of(inside), vec2f(0.0), frame.size - 1.0)) + 0.5;
+    let stretch = stretch_around(centre, 1.0);
+    words[0] = vec4f(centre, vec2f(frame.near, frame.far) + frame.forward.w);
+    words[1] = vec4f(stretch[0], longest);
+    words[2] = vec4f(stretch[1], f32(frame.perspective));
+    words[3] = vec4f(f32(rank & 0xffffffu), plane, 0.0, 0.0);
+    store(i, words, last_of(low), last_of(high), Values(low, high));
 }

@@ -6,18 +6,16 @@ fn fragment(drawn: Drawn) -> @location(0) vec4f {
     let values = values_in(words);
     cell_plane = words[3].y;
     let at = drawn.at.xy;
-    let xy = sample_of(at);
-    let direction = direction_at(xy);
-    let stretch = length(direction);
+    let stretch = stretch_of(words[1].xyz, words[2].xyz, at - words[0].xy);
+    let is_perspective = words[2].w != 0.0;
     let depths = drawn.depths;
     var front = drawn.front;
     var back = drawn.back;
     var deeper = depths.z;
-    // From where rays start, along the view direction.
     var depth = depths.x;
-    if frame.perspective == 1u {
+    if is_perspective {
         deeper = depths.z / (depths.x * depths.y);
-        depth = 1.0 / depths.x - frame.forward.w;
+        depth = 1.0 / depths.x;
         if FORM == INTERPOLATED {
             front /= depths.x;
             back /= depths.y;
@@ -28,20 +26,22 @@ fn fragment(drawn: Drawn) -> @location(0) vec4f {
     if FORM == LINEAR {
         length = depths.w;
     }
-    length = clamp(length, 0.0, words[2].z);
+    length = clamp(length, 0.0, words[1].w);
     front = clamp(front, values[0], values[1]);
     back = clamp(back, values[0], values[1]);
     // As far as it is within the limits.
-    let t = depth * stretch;
-    let limits = limits_of(at, origin_at(xy), direction / stretch, stretch);
-    let start = max(limits.x - t, 0.0);
-    let end = min(limits.y - t, length);
+    var limits = (words[0].zw - depth) * stretch;
+    if HAS_ENDS || HAS_PLANES {
+        let xy = sample_of(at);
+        limits = limits_of(at, origin_at(xy), direction_at(xy) / stretch, stretch) - (depth - frame.forward.w) * stretch;
+    }
+    let start = max(limits.x, 0.0);
+    let end = min(limits.y, length);
     if !(start < end) {
         discard;
     }
     let rise = back - front;
     back = select(front + rise * (end / length), back, end == length);
     front = select(front + rise * (start / length), front, start == 0.0);
-    let line = Line(words[0], words[1], words[2].xy);
-    return quantised(colored(front, back, end - start, u32(words[3].x), line), at, u32(words[2].w));
+    return quantised(colored(front, back, end - start, values[0], words), at, u32(words[3].x));
 }

@@ -3,8 +3,9 @@
 // The words of a record:
 // 0–2  the cell's facets, counted from the middle of a pixel amid it;
 // 3    that middle, and the nearnesses between which rays are seen;
-// 4    depth and t there, the longest edge, and the interval of the function that holds the least value;
-// 5–7  the line of that interval: value, slope, ends; then the rank, and which facets are entered.
+// 4–5  the stretch of rays around it, times the cell's depth; the longest edge, and 1 in perspective views;
+// 6    which facets are entered, the rank, and the cell's depth (t in a parallel view);
+// then the lines of the function.
 // The values: in the middle; how it rises from pixel to pixel to the right and down, and towards the eye; the least and
 // the greatest.
 
@@ -87,9 +88,8 @@ fn longer(a: vec2f, b: vec2f) -> vec2f {
     return select(a, b, dot(b, b) > dot(a, a));
 }
 
-/// Depths that are as good as none, and volumes and slopes that f32 may not divide by.
+/// Depths that are as good as none.
 const AT_EYE = 1e-6;
-const FLAT = 1e-30;
 
 fn write_record(i: u32, solid: Solid, v: array<Value, 4>, piece: u32, rank: u32) {
     var p = solid.p;
@@ -134,7 +134,7 @@ fn write_record(i: u32, solid: Solid, v: array<Value, 4>, piece: u32, rank: u32)
         slopes -= heights;
     }
     slopes = select(slopes, vec4f(FLAT), abs(slopes) < vec4f(FLAT));
-    var words: array<vec4f, 8>;
+    var words: array<vec4f, 7>;
     words[0] = heights / slopes;
     words[1] = vec4f(dot(right, n[0]), dot(right, n[1]), dot(right, n[2]), dot(right, n[3])) / slopes;
     words[2] = vec4f(dot(down, n[0]), dot(down, n[1]), dot(down, n[2]), dot(down, n[3])) / slopes;
@@ -152,13 +152,11 @@ fn write_record(i: u32, solid: Solid, v: array<Value, 4>, piece: u32, rank: u32)
     let rises = array<Value, 3>((v[1] - v[0]) / volume, (v[2] - v[0]) / volume, (v[3] - v[0]) / volume);
     let low = min(min(v[0], v[1]), min(v[2], v[3]));
     let high = max(max(v[0], v[1]), max(v[2], v[3]));
-    let interval = interval_of(last_of(low));
-    let line = line_of(interval);
-    words[4] = vec4f(depth, t, longest, f32(interval));
-    words[5] = line.value;
-    words[6] = line.slope;
-    words[7] = vec4f(line.ends, f32(rank & 0xffffffu), f32(bits.x | bits.y | bits.z | bits.w));
-    store(i, words, Values(
+    let stretch = stretch_around(centre, depth);
+    words[4] = vec4f(stretch[0], longest);
+    words[5] = vec4f(stretch[1], f32(frame.perspective));
+    words[6] = vec4f(f32(bits.x | bits.y | bits.z | bits.w), f32(rank & 0xffffffu), select(t, depth, frame.perspective == 1u), 0.0);
+    store(i, words, last_of(low), last_of(high), Values(
         v[0] + (rises[0] * dot(away, n[1]) + rises[1] * dot(away, n[2]) + rises[2] * dot(away, n[3])),
         rises[0] * dot(right, n[1]) + rises[1] * dot(right, n[2]) + rises[2] * dot(right, n[3]),
         rises[0] * dot(down, n[1]) + rises[1] * dot(down, n[2]) + rises[2] * dot(down, n[3]),

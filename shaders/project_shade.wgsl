@@ -12,79 +12,11 @@ fn most_work() -> u32 {
     return MOST_WORK;
 }
 
-/// The intervals of the function, LINES_ACROSS in a row: value, slope, and ends below each other. A texture, as drivers
-/// in software look buffers up lane by lane.
-@group(0) @binding(10) var lines: texture_2d<f32>;
-
-/// A line of the function of the last component, and between which values it is that.
-struct Line {
-    value: vec4f,
-    slope: vec4f,
-    ends: vec2f,
-}
-
-/// The interval of the function that begins at the knot `i`.
-fn line_of(i: u32) -> Line {
-    let at = vec2u(i % LINES_ACROSS, 3u * (i / LINES_ACROSS));
-    let ends = textureLoad(lines, at + vec2u(0u, 2u), 0).xy;
-    return Line(textureLoad(lines, at, 0), textureLoad(lines, at + vec2u(0u, 1u), 0), ends);
-}
-
-/// The interval that a constant `s` is in.
-fn interval_of(s: f32) -> u32 {
-    return track(function.opacity, select(function.end, function.color, PAIR), 0u, s, s).i;
-}
-
-/// Premultiplied colour and opacity of a segment, by the exact integral; `line` is that of the interval `i`, in which
-/// the lesser value is or one below it. Intervals are taken from the lesser value to the greater, whichever is in
-/// front, so that the first is the same for all fragments of a cell and comes with it.
-fn integrated(front: Value, back: Value, length: f32, first: u32, first_line: Line) -> vec4f {
-    let rises = last_of(front) <= last_of(back);
-    let low = min(last_of(front), last_of(back));
-    let range = abs(last_of(back) - last_of(front));
-    let share = select(0.0, 1.0 / range, range > 0.0);
-    var sum = vec4f(0.0, 0.0, 0.0, 1.0);
-    var i = first;
-    var line = first_line;
-    var u = 0.0;
-    loop {
-        let is_last = low + range < line.ends.y || i + 2u >= function.end;
-        let next = select(clamp((line.ends.y - low) * share, u, 1.0), 1.0, is_last);
-        let a = line.value + line.slope * (clamp(low + range * u, line.ends.x, line.ends.y) - line.ends.x);
-        let b = line.value + line.slope * (clamp(low + range * next, line.ends.x, line.ends.y) - line.ends.x);
-        var f = select(b, a, rises);
-        var r = select(a, b, rises);
-        if RGBA {
-            let ends = select(vec2f(1.0 - next, 1.0 - u), vec2f(u, next), rises);
-            f = vec4f(f.x, mix(color_of(front), color_of(back), ends.x) * function.scale);
-            r = vec4f(r.x, mix(color_of(front), color_of(back), ends.y) * function.scale);
-        }
-        let l = (next - u) * length;
-        let p = piece(f.x * l, r.x * l);
-        let emitted = (f.yzw * p.y + r.yzw * p.z) * select(1.0, l, DIRECT);
-        // In front of what there is, or behind it.
-        sum = vec4f(select(emitted + (1.0 - p.x) * sum.xyz, sum.xyz + sum.w * emitted, rises), sum.w * (1.0 - p.x));
-        work++;
-        if is_last || work > most_work() {
-            break;
-        }
-        i++;
-        line = line_of(i);
-        u = next;
-    }
-    return vec4f(sum.xyz, 1.0 - sum.w);
-}
-
-/// Premultiplied colour and opacity of a segment.
-fn colored(front: Value, back: Value, length: f32, i: u32, line: Line) -> vec4f {
+/// Premultiplied colour and opacity of a segment of a cell whose least value is `least`.
+fn colored(front: Value, back: Value, length: f32, least: Value, words: Words) -> vec4f {
     work = 0u;
-    if COLORING == EXACT && !PAIR {
-        return integrated(front, back, length, i, line);
-    }
     if COLORING == EXACT {
-        light = vec4f(0.0, 0.0, 0.0, 1.0);
-        add_segment(front, back, length);
-        return vec4f(light.xyz, 1.0 - light.w);
+        return integrated(front, back, length, least, words);
     }
     return tabulated(last_of(front), last_of(back), length);
 }

@@ -6,6 +6,7 @@
 
 mod frame;
 pub(crate) mod gpu;
+mod lines;
 mod record;
 
 use serde::{Deserialize, Serialize};

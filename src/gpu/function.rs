@@ -58,7 +58,8 @@ pub(crate) fn upload(gpu: &Gpu, exact: &Exact<f32>) -> Result<[Buffer; 3]> {
     ])
 }
 
-/// The knots as a texture: value, slope, and ends below each other, [`LINES_ACROSS`] in a row.
+/// The knots as a texture: value, slope, and below each other the two ends and the next interval that is not empty (of
+/// the last, itself), [`LINES_ACROSS`] in a row.
 ///
 /// # Errors
 /// Those of [`Texture::new`].
@@ -66,12 +67,18 @@ pub(crate) fn lines(gpu: &Gpu, exact: &Exact<f32>) -> Result<Texture> {
     let mut knots = knots(exact);
     let across = knots.len().clamp(1, LINES_ACROSS);
     let down = knots.len().div_ceil(across).max(1);
+    let mut next: Vec<f32> = (0..across * down).map(|i| i as f32).collect();
+    for i in (1..knots.len()).rev() {
+        let is_empty = knots[i].ends[0] >= knots[i].ends[1];
+        next[i - 1] = if is_empty { next[i] } else { i as f32 };
+    }
     knots.resize(across * down, Knot::zeroed());
+    let ends: Vec<_> = knots.iter().zip(&next).map(|(k, n)| [k.ends[0], k.ends[1], *n, 0.0]).collect();
     let texels: Vec<[f32; 4]> = knots
         .chunks(across)
-        .flat_map(|row| {
-            let ends = |k: &Knot| [k.ends[0], k.ends[1], 0.0, 0.0];
-            row.iter().map(|k| k.value).chain(row.iter().map(|k| k.slope)).chain(row.iter().map(ends))
+        .zip(ends.chunks(across))
+        .flat_map(|(row, ends)| {
+            row.iter().map(|k| k.value).chain(row.iter().map(|k| k.slope)).chain(ends.iter().copied())
         })
         .collect();
     let size = [across as u32, 3 * down as u32];

@@ -71,6 +71,20 @@ impl<R: Real> Knots<R> {
         self.value[i][k] + self.slope[i][k] * (s - self.s[i])
     }
 
+    /// The most lines that values which differ by up to `width` can be on.
+    pub(crate) fn lines_within(&self, width: R) -> usize {
+        let begins: Vec<R> = self.s.windows(2).filter(|k| k[0] < k[1]).map(|k| k[0]).collect();
+        let ends = begins.iter().skip(1).enumerate();
+        // From just below where a line ends.
+        let beyond = |(i, &end): (usize, &R)| begins.partition_point(|&b| b < end + width) - i;
+        ends.map(beyond).max().unwrap_or(1)
+    }
+
+    /// The greatest extinction.
+    pub(crate) fn steepest(&self) -> R {
+        self.value.iter().fold(R::of(0.0), |most, v| most.max(v[0]))
+    }
+
     /// Whether anything between `low` and `high` has extinction, or, if `direct`, a colour.
     pub(crate) fn shows(&self, low: f32, high: f32, direct: bool) -> bool {
         let channels = if direct { 4 } else { 1 };

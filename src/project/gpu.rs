@@ -9,6 +9,7 @@ mod ordering;
 mod program;
 
 use super::frame::{Seen, filled};
+use super::lines::{Extent, Lines};
 use super::record::Layout;
 use super::{Counts, Fragments, Switches, Target};
 use crate::error::{Error, Result};
@@ -64,6 +65,7 @@ pub(crate) struct Project {
     cells: Option<Chunks>,
     points: Option<Chunks>,
     values: Option<Chunks>,
+    extent: Option<Extent>,
     function: Option<HeldFunction>,
     program: Option<Program>,
     canvas: Option<Canvas>,
@@ -117,6 +119,7 @@ impl Project {
             cells: None,
             points: None,
             values: None,
+            extent: None,
             function: None,
             program: None,
             canvas: None,
@@ -140,6 +143,9 @@ impl Project {
     /// Takes `part` for changed.
     pub(crate) fn forget(&mut self, part: Part) {
         self.ordered = None;
+        if part != Part::Function {
+            self.extent = None;
+        }
         match part {
             Part::Mesh => (self.cells, self.points, self.values) = (None, None, None),
             Part::Points => self.points = None,
@@ -201,6 +207,8 @@ impl Project {
         let format = self.format(switches.target)?;
         self.upload(geometry, values)?;
         self.prepare_table(exact, table)?;
+        let extent = self.extent.get_or_insert_with(|| Extent::new(geometry, values));
+        let layout = layout(&self.gpu.device.limits(), switches.fragments, exact, table.is_some(), *extent);
         let association = arrays::association(values);
         let arrays = self.arrays()?;
         let seen = Seen::new(geometry, view);
@@ -209,7 +217,6 @@ impl Project {
         // In parallel views all segments of a cell are on one plane.
         let one_plane = table.is_some_and(|t| t.choice().per_cell) || view.eye().is_none();
         limits.plane_per_cell = one_plane && switches.fragments != Fragments::Intersected;
-        let layout = Layout::new(switches.fragments, N);
         let source = program(&variant, association, switches, &layout, table.map(|t| &**t), limits, &arrays);
         self.prepare_canvas(&layout, view.size(), format)?;
         self.compile(&arrays, source, switches, layout, format)?;
@@ -300,6 +307,18 @@ impl Pass {
             filled: filled.raw.clone(),
             _buffers: buffers,
         })
+    }
+}
+
+/// Records for a function and cells of this extent, with as many lines as the device can hand to fragments.
+fn layout(limits: &wgpu::Limits, form: Fragments, exact: &Exact<f32>, by_table: bool, extent: Extent) -> Layout {
+    let components = exact.kind.components();
+    let without = Layout::new(form, components, Lines::None);
+    let most = limits.max_vertex_attributes.min(limits.max_inter_stage_shader_variables) as usize;
+    let room = most.saturating_sub(without.attributes().iter().flatten().count());
+    match by_table {
+        true => without,
+        false => Layout::new(form, components, Lines::new(exact, extent, room)),
     }
 }
 

@@ -7,9 +7,10 @@
 //! lane.
 
 use super::Fragments;
+use super::lines::Lines;
 
-/// The words of a form before its values, and how many values there are.
-const INTERSECTED: (usize, usize) = (8, 6);
+/// The words of a form before its lines, and how many values there are.
+const INTERSECTED: (usize, usize) = (7, 6);
 const INTERPOLATED: (usize, usize) = (4, 2);
 
 /// A float, two or four.
@@ -30,23 +31,26 @@ pub(crate) struct Layout {
     share: usize,
     words_at: u64,
     components: usize,
-    /// The first word with values, and the number of values.
+    lines: Lines,
+    /// The first word with lines, the first with values, and the number of values.
+    lines_at: usize,
     values: (usize, usize),
 }
 
 impl Layout {
-    pub(crate) fn new(form: Fragments, components: usize) -> Self {
+    pub(crate) fn new(form: Fragments, components: usize, lines: Lines) -> Self {
         let is_intersected = form == Fragments::Intersected;
         let own = match is_intersected {
             true => vec![("corner", 2)],
             false => vec![("corner", 2), ("front", components), ("back", components), ("depths", 4)],
         };
-        let (triangles, values): (&[u32], _) = match is_intersected {
+        let (triangles, (lines_at, count)): (&[u32], _) = match is_intersected {
             true => (&[0, 1, 2, 0, 2, 3], INTERSECTED),
             false => (&[0, 1, 2, 0, 2, 3, 0, 3, 4, 0, 4, 1], INTERPOLATED),
         };
         let parts = triangles.iter().fold(0, |n, &i| n.max(i + 1));
-        let words = values.0 + (values.1 * components).div_ceil(4);
+        let values = (lines_at + lines.words(), count);
+        let words = values.0 + (count * components).div_ceil(4);
         let mut end = 0;
         let place = |(name, floats): (&'static str, usize)| {
             let bytes = 4 * floats as u64;
@@ -56,7 +60,8 @@ impl Layout {
         };
         let own: Vec<_> = own.into_iter().map(place).collect();
         let share = words.div_ceil(parts as usize);
-        Layout { triangles, parts, own, words, share, words_at: end.next_multiple_of(16), components, values }
+        let words_at = end.next_multiple_of(16);
+        Layout { triangles, parts, own, words, share, words_at, components, lines, lines_at, values }
     }
 
     /// Bytes of a part, and of a record.
@@ -91,10 +96,10 @@ impl Layout {
         parts
     }
 
-    /// `Record` and `store`, which fills its words; `Stored`, which is what a vertex finds of it, and `Drawn`, which it
+    /// `Record` and `store`, which fills its words, with the function between two values; `Stored`, which is what a vertex finds of it, and `Drawn`, which it
     /// hands on to fragments; and what fragments take out of that again.
     pub(crate) fn wgsl(&self) -> String {
-        let Layout { parts, words, share, values: (first, count), components, .. } = *self;
+        let Layout { parts, words, share, lines_at, values: (first, count), components, .. } = *self;
         let own = |each: &dyn Fn(usize, &str) -> String, skipped: usize| {
             let own = self.own.iter().enumerate().skip(skipped);
             own.map(|(i, (name, floats, _))| each(i, &format!("{name}: {}, ", type_of(*floats)))).collect::<String>()
@@ -110,6 +115,7 @@ impl Layout {
             _ => format!("v[{}].{}", i / components, ["x", "y", "z", "w"][i % components]),
         };
         let word = |i: usize| match i.checked_sub(first) {
+            None if i >= lines_at => format!("lines[{}]", i - lines_at),
             None => format!("words[{i}]"),
             Some(k) => format!("vec4f({})", (4 * k..4 * k + 4).map(packed).collect::<Vec<_>>().join(", ")),
         };
@@ -119,14 +125,16 @@ impl Layout {
             format!("Value({})", floats.join(", "))
         };
         let values: Vec<_> = (0..count).map(value).collect();
+        let lines = if self.lines == Lines::None { "" } else { "let lines = lines_between(low, high); " };
 
         [
+            self.lines.wgsl(lines_at),
             format!("alias Words = array<vec4f, {words}>;"),
             format!("alias Values = array<Value, {count}>;"),
             format!("struct Vertex {{ {}words: array<vec4f, {share}> }}", own(&|_, field| field.into(), 0)),
             format!("struct Record {{ vertices: array<Vertex, {parts}> }}"),
             format!(
-                "fn store(i: u32, words: array<vec4f, {first}>, v: Values) {{ {}}}",
+                "fn store(i: u32, words: array<vec4f, {lines_at}>, low: f32, high: f32, v: Values) {{ {lines}{}}}",
                 each(&|w| format!("records[i].vertices[{}].words[{}] = {}; ", w / share, w % share, word(w)))
             ),
             format!(

@@ -16,6 +16,7 @@ use wgpu::ShaderStages as Stages;
 
 const SHARED: &str = include_str!("../../../shaders/project.wgsl");
 const CELLS: &str = include_str!("../../../shaders/project_cells.wgsl");
+const LINES: &str = include_str!("../../../shaders/project_lines.wgsl");
 const SHADE: &str = include_str!("../../../shaders/project_shade.wgsl");
 
 /// For each form: its records, and how they are drawn.
@@ -141,5 +142,5 @@ pub(super) fn program(
     text += &shader::accessors(arrays);
     text += &table::constants(table, limits.plane_per_cell);
     text += &table::declarations(0, 6);
-    [&text, shader::CELL, shader::INTEGRAL, TABLE, SHARED, CELLS, records, SHADE, drawing].join("\n")
+    [&text, shader::CELL, shader::INTEGRAL, TABLE, SHARED, LINES, CELLS, records, SHADE, drawing].join("\n")
 }

@@ -1,0 +1,83 @@
+// The lines of the transfer function, and the exact integral by those that a segment is on, one after the other.
+
+/// The intervals of the function that are not empty, LINES_ACROSS in a row: value, slope, and below each other the two
+/// ends and the number of the next. A texture, as drivers in software look buffers up lane by lane.
+@group(0) @binding(10) var lines: texture_2d<f32>;
+
+/// A line of the function, between which values it is that, and the interval above; the last has itself there.
+struct Line {
+    value: vec4f,
+    slope: vec4f,
+    ends: vec2f,
+    next: u32,
+}
+
+/// The interval of the function that begins at the knot `i`.
+fn line_of(i: u32) -> Line {
+    let at = vec2u(i % LINES_ACROSS, 3u * (i / LINES_ACROSS));
+    let ends = textureLoad(lines, at + vec2u(0u, 2u), 0);
+    return Line(textureLoad(lines, at, 0), textureLoad(lines, at + vec2u(0u, 1u), 0), ends.xy, u32(ends.z));
+}
+
+/// The interval that a constant `s` is in.
+fn interval_of(s: f32) -> u32 {
+    return track(function.opacity, select(function.end, function.color, PAIR), 0u, s, s).i;
+}
+
+/// A segment from its lesser value to its greater, whichever is in front. Places along it are shares of it, from 0 to 1.
+struct Ramp {
+    low: f32,
+    range: f32,
+    /// Its reciprocal.
+    share: f32,
+    length: f32,
+    rises: bool,
+}
+
+fn ramp_of(front: f32, back: f32, length: f32) -> Ramp {
+    let range = abs(back - front);
+    return Ramp(min(front, back), range, 1.0 / max(range, FLAT), length, front <= back);
+}
+
+/// Differences of values that are as good as none.
+const FLAT = 1e-30;
+
+/// `behind` what lies in front of it, or so for falling ramps.
+fn joined(ramp: Ramp, before: vec4f, emitted: vec3f, through: f32) -> vec4f {
+    let color = select(emitted + through * before.xyz, before.xyz + before.w * emitted, ramp.rises);
+    return vec4f(color, before.w * through);
+}
+
+/// Premultiplied colour and opacity of a segment, by lines that are looked up one by one; the lesser value is in the
+/// interval `first` or above it.
+fn by_intervals(front: Value, back: Value, length: f32, first: u32) -> vec4f {
+    let ramp = ramp_of(last_of(front), last_of(back), length);
+    let high = ramp.low + ramp.range;
+    var sum = vec4f(0.0, 0.0, 0.0, 1.0);
+    var i = first;
+    var u = 0.0;
+    loop {
+        let line = line_of(i);
+        let is_last = high < line.ends.y || line.next == i;
+        let next = select(clamp((line.ends.y - ramp.low) * ramp.share, u, 1.0), 1.0, is_last);
+        let a = line.value + line.slope * (clamp(ramp.low + ramp.range * u, line.ends.x, line.ends.y) - line.ends.x);
+        let b = line.value + line.slope * (clamp(ramp.low + ramp.range * next, line.ends.x, line.ends.y) - line.ends.x);
+        var f = select(b, a, ramp.rises);
+        var r = select(a, b, ramp.rises);
+        if RGBA {
+            let ends = select(vec2f(1.0 - next, 1.0 - u), vec2f(u, next), ramp.rises);
+            f = vec4f(f.x, mix(color_of(front), color_of(back), ends.x) * function.scale);
+            r = vec4f(r.x, mix(color_of(front), color_of(back), ends.y) * function.scale);
+        }
+        let l = (next - u) * length;
+        let p = piece(f.x * l, r.x * l);
+        sum = joined(ramp, sum, (f.yzw * p.y + r.yzw * p.z) * select(1.0, l, DIRECT), 1.0 - p.x);
+        work++;
+        if is_last || work > most_work() {
+            break;
+        }
+        i = line.next;
+        u = next;
+    }
+    return vec4f(sum.xyz, 1.0 - sum.w);
+}
