@@ -56,24 +56,26 @@ fn opacity_of_depth(d: f32) -> f32 {
     return 1.0 - exponential(-d);
 }
 
-/// Opacity of a piece of optical depths `x` and `y` up to MILD, and the weights of its emission, both ends together and
-/// the back alone: see `Piece::mild` in src/integral.rs.
-fn mild(x: f32, y: f32) -> vec3f {
-    let depth = (x + y) * 0.5;
-    let rise = y - x;
+/// What a piece of an optical depth up to MILD does that is `rise` denser at its back than at its front: its opacity,
+/// the weights of its emission, both ends together and the back alone, and how much comes through. See `Piece::mild`
+/// in src/integral.rs.
+fn mild(depth: f32, rise: f32) -> vec4f {
     let square = depth * depth;
-    let h = depth * 0.5;
-    let q = h * (1.0 - h * (1.0 / 2.0 - h * (1.0 / 6.0 - h * (1.0 / 24.0 - h * (1.0 / 120.0 - h * (1.0 / 720.0 - h * (1.0 / 5040.0 - h * (1.0 / 40320.0))))))));
-    let even = square * (1.0 / 24.0 + square * (1.0 / 1920.0 + square * (1.0 / 322560.0)));
-    let bent = (1.0 / 12.0 + square * (1.0 / 480.0 + square * (1.0 / 53760.0)))
-        + rise * ((1.0 / 240.0 + square * (1.0 / 13440.0)) + rise * ((1.0 / 6720.0 + square * (1.0 / 483840.0)) + rise * (1.0 / 241920.0)));
+    let h = depth * -0.5;
+    let powers = fma(h, fma(h, fma(h, fma(h, fma(h, fma(h, fma(h, 1.0 / 40320.0, 1.0 / 5040.0), 1.0 / 720.0), 1.0 / 120.0), 1.0 / 24.0), 1.0 / 6.0), 0.5), 1.0);
+    let q = -h * powers;
     let e = 1.0 - q;
-    let alpha = e * depth * (1.0 + even);
+    let even = square * fma(square, fma(square, 1.0 / 322560.0, 1.0 / 1920.0), 1.0 / 24.0);
+    let once = fma(square, fma(square, 1.0 / 53760.0, 1.0 / 480.0), 1.0 / 12.0);
+    let twice = fma(square, 1.0 / 13440.0, 1.0 / 240.0);
+    let thrice = fma(rise, 1.0 / 241920.0, fma(square, 1.0 / 483840.0, 1.0 / 6720.0));
+    let bent = fma(rise, fma(rise, thrice, twice), once);
+    let uneven = fma(rise, bent, even);
     if DIRECT {
-        let seen = 1.0 + even + rise * bent;
-        return vec3f(alpha, e * seen, e * (0.5 * seen - depth * bent));
+        let seen = 1.0 + uneven;
+        return vec4f(q + q * e, e * seen, e * (0.5 * seen - depth * bent), e * e);
     }
-    return vec3f(alpha, alpha, e * (q + even + rise * bent));
+    return vec4f(q + q * e, q + q * e, e * (q + uneven), e * e);
 }
 
 /// What a piece of optical depths `x` and `y` does: its opacity and the weights of the emission at its two ends.
@@ -90,9 +92,10 @@ fn piece(x: f32, y: f32) -> vec3f {
     var sum = vec3f();
     loop {
         let first = (x + (y - x) * start) * width;
-        let p = mild(first, first + (y - x) * width * width);
+        let rise = (y - x) * width * width;
+        let p = mild(first + 0.5 * rise, rise);
         sum += through * vec3f(p.x, select(1.0, width, DIRECT) * vec2f(p.y, start * p.y + width * p.z));
-        through -= through * p.x;
+        through *= p.w;
         start += width;
         work++;
         if start > end - 0.5 * width {

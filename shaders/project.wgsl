@@ -63,8 +63,8 @@ fn stretch_around(at: vec2f, scale: f32) -> array<vec3f, 2> {
 }
 
 fn stretch_of(linear: vec3f, square: vec3f, offset: vec2f) -> f32 {
-    let right = linear.y + offset.x * square.x + offset.y * square.y;
-    return sqrt(linear.x + offset.x * right + offset.y * (linear.z + offset.y * square.z));
+    let right = fma(offset.x, square.x, fma(offset.y, square.y, linear.y));
+    return sqrt(fma(offset.x, right, fma(offset.y, fma(offset.y, square.z, linear.z), linear.x)));
 }
 
 fn origin_at(xy: vec2f) -> vec3f {

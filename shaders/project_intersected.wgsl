@@ -89,7 +89,14 @@ fn longer(a: vec2f, b: vec2f) -> vec2f {
 }
 
 /// Depths that are as good as none.
-const AT_EYE = 1e-6;
+const AT_EYE = 1e-18;
+
+/// Faces that are inclined less than this to the rays are taken for seen edge-on: where rays cross them f32 can't tell.
+const EDGE_ON = 1e-5;
+
+/// By how much rays are aside of pixels' centres when such faces are asked on which side they are, in pixels: of two
+/// cells that share one, a ray that lies in it meets exactly one. Less than outlines are grown by.
+const ASIDE = vec2f(4e-4, 1.7e-4);
 
 fn write_record(i: u32, solid: Solid, v: array<Value, 4>, piece: u32, rank: u32) {
     var p = solid.p;
@@ -111,12 +118,14 @@ fn write_record(i: u32, solid: Solid, v: array<Value, 4>, piece: u32, rank: u32)
     }
     centre = floor(clamp(centre, vec2f(0.0), frame.size - 1.0)) + 0.5;
     let xy = sample_of(centre);
+    let longest = max(max(max(length(solid.b), length(solid.c)), max(length(solid.d), distance(solid.b, solid.c))), max(distance(solid.b, solid.d), distance(solid.c, solid.d)));
     // Where the pixel's ray is as deep as the cell's middle, how far that is from one pixel to the next, and from the
     // eye.
     var t = dot(centroid, frame.forward.xyz);
     var depth = 1.0;
     if frame.perspective == 1u {
-        depth = max(t + frame.forward.w, frame.nearest);
+        // Around the eye, as far as the cell goes: nearnesses of what is much farther cancel.
+        depth = max(max(t + frame.forward.w, frame.nearest), 0.5 * longest);
         t = depth - frame.forward.w;
     }
     let along = direction_at(xy);
@@ -128,16 +137,21 @@ fn write_record(i: u32, solid: Solid, v: array<Value, 4>, piece: u32, rank: u32)
     // Inward normals, but for the sign of the volume, of the faces opposite to each corner.
     let n = array<vec3f, 4>(-cross(solid.c - solid.b, solid.d - solid.b), cross(solid.c, solid.d), cross(solid.d, solid.b), cross(solid.b, solid.c));
     let volume = dot(solid.b, n[1]);
-    let heights = vec4f(dot(away - solid.b, n[0]), dot(away, n[1]), dot(away, n[2]), dot(away, n[3]));
+    var heights = vec4f(dot(away - solid.b, n[0]), dot(away, n[1]), dot(away, n[2]), dot(away, n[3]));
     var slopes = vec4f(dot(out, n[0]), dot(out, n[1]), dot(out, n[2]), dot(out, n[3]));
     if frame.perspective == 1u {
         slopes -= heights;
     }
-    slopes = select(slopes, vec4f(FLAT), abs(slopes) < vec4f(FLAT));
+    let across = vec4f(dot(right, n[0]), dot(right, n[1]), dot(right, n[2]), dot(right, n[3]));
+    let along_rows = vec4f(dot(down, n[0]), dot(down, n[1]), dot(down, n[2]), dot(down, n[3]));
+    let size = vec4f(length(n[0]), length(n[1]), length(n[2]), length(n[3])) * length(out);
+    let edge_on = abs(slopes) <= EDGE_ON * size;
+    heights = select(heights, heights + (ASIDE.x * across + ASIDE.y * along_rows), edge_on);
+    slopes = select(slopes, vec4f(FLAT), edge_on);
     var words: array<vec4f, 7>;
     words[0] = heights / slopes;
-    words[1] = vec4f(dot(right, n[0]), dot(right, n[1]), dot(right, n[2]), dot(right, n[3])) / slopes;
-    words[2] = vec4f(dot(down, n[0]), dot(down, n[1]), dot(down, n[2]), dot(down, n[3])) / slopes;
+    words[1] = across / slopes;
+    words[2] = along_rows / slopes;
     let entered = (slopes > vec4f(0.0)) == vec4<bool>(volume > 0.0);
     let bits = select(vec4u(0u), vec4u(1u, 2u, 4u, 8u), entered);
     if !(abs(volume) > FLAT) {
@@ -148,7 +162,6 @@ fn write_record(i: u32, solid: Solid, v: array<Value, 4>, piece: u32, rank: u32)
         limits = depth / max(vec2f(frame.near, frame.far) + frame.forward.w, vec2f(AT_EYE)) - 1.0;
     }
     words[3] = vec4f(centre, limits);
-    let longest = max(max(max(length(solid.b), length(solid.c)), max(length(solid.d), distance(solid.b, solid.c))), max(distance(solid.b, solid.d), distance(solid.c, solid.d)));
     let rises = array<Value, 3>((v[1] - v[0]) / volume, (v[2] - v[0]) / volume, (v[3] - v[0]) / volume);
     let low = min(min(v[0], v[1]), min(v[2], v[3]));
     let high = max(max(v[0], v[1]), max(v[2], v[3]));

@@ -31,8 +31,8 @@ fn fragment(drawn: Drawn) -> @location(0) vec4f {
     let share = divisors.yx / (divisors.x * divisors.y);
     let stretch = stretch_of(words[4].xyz, words[5].xyz, offset);
     let length = min((near.x - near.y) * share.x * share.y * stretch, words[4].w);
-    let here = values[1] * offset.x + values[2] * offset.y;
-    let front = clamp(values[0] + (here + values[3] * near.x) * share.x, values[4], values[5]);
-    let back = clamp(values[0] + (here + values[3] * near.y) * share.y, values[4], values[5]);
+    let here = fma(values[1], Value(offset.x), values[2] * offset.y);
+    let front = clamp(fma(fma(values[3], Value(near.x), here), Value(share.x), values[0]), values[4], values[5]);
+    let back = clamp(fma(fma(values[3], Value(near.y), here), Value(share.y), values[0]), values[4], values[5]);
     return quantised(colored(front, back, length, values[4], words), at, u32(words[6].y));
 }

@@ -31,27 +31,31 @@ struct Ramp {
     /// Its reciprocal.
     share: f32,
     length: f32,
-    rises: bool,
+    /// 1 if the lesser value is in front, −1 if the greater one is.
+    sign: f32,
 }
 
 fn ramp_of(front: f32, back: f32, length: f32) -> Ramp {
     let range = abs(back - front);
-    return Ramp(min(front, back), range, 1.0 / max(range, FLAT), length, front <= back);
+    return Ramp(min(front, back), range, 1.0 / max(range, FLAT), length, select(-1.0, 1.0, front <= back));
 }
 
 /// Differences of values that are as good as none.
 const FLAT = 1e-30;
 
-/// `behind` what lies in front of it, or so for falling ramps.
-fn joined(ramp: Ramp, before: vec4f, emitted: vec3f, through: f32) -> vec4f {
-    let color = select(emitted + through * before.xyz, before.xyz + before.w * emitted, ramp.rises);
-    return vec4f(color, before.w * through);
+/// Two parts of a ramp, the one of lesser values first: premultiplied colour, and how much of what lies behind comes
+/// through.
+fn joined(ramp: Ramp, one: vec4f, other: vec4f) -> vec4f {
+    let rises = ramp.sign > 0.0;
+    let color = fma(other.xyz, vec3f(select(1.0, one.w, rises)), one.xyz * select(other.w, 1.0, rises));
+    return vec4f(color, one.w * other.w);
 }
 
 /// Premultiplied colour and opacity of a segment, by lines that are looked up one by one; the lesser value is in the
 /// interval `first` or above it.
 fn by_intervals(front: Value, back: Value, length: f32, first: u32) -> vec4f {
     let ramp = ramp_of(last_of(front), last_of(back), length);
+    let rises = ramp.sign > 0.0;
     let high = ramp.low + ramp.range;
     var sum = vec4f(0.0, 0.0, 0.0, 1.0);
     var i = first;
@@ -62,16 +66,16 @@ fn by_intervals(front: Value, back: Value, length: f32, first: u32) -> vec4f {
         let next = select(clamp((line.ends.y - ramp.low) * ramp.share, u, 1.0), 1.0, is_last);
         let a = line.value + line.slope * (clamp(ramp.low + ramp.range * u, line.ends.x, line.ends.y) - line.ends.x);
         let b = line.value + line.slope * (clamp(ramp.low + ramp.range * next, line.ends.x, line.ends.y) - line.ends.x);
-        var f = select(b, a, ramp.rises);
-        var r = select(a, b, ramp.rises);
+        var f = select(b, a, rises);
+        var r = select(a, b, rises);
         if RGBA {
-            let ends = select(vec2f(1.0 - next, 1.0 - u), vec2f(u, next), ramp.rises);
+            let ends = select(vec2f(1.0 - next, 1.0 - u), vec2f(u, next), rises);
             f = vec4f(f.x, mix(color_of(front), color_of(back), ends.x) * function.scale);
             r = vec4f(r.x, mix(color_of(front), color_of(back), ends.y) * function.scale);
         }
         let l = (next - u) * length;
         let p = piece(f.x * l, r.x * l);
-        sum = joined(ramp, sum, (f.yzw * p.y + r.yzw * p.z) * select(1.0, l, DIRECT), 1.0 - p.x);
+        sum = joined(ramp, sum, vec4f((f.yzw * p.y + r.yzw * p.z) * select(1.0, l, DIRECT), 1.0 - p.x));
         work++;
         if is_last || work > most_work() {
             break;

@@ -9,17 +9,16 @@ fn extinction_between(line: Line, low: f32, high: f32) -> f32 {
     return select(0.0, max(ends.x, ends.y), a <= b);
 }
 
-/// Adds to `before` (colour, and how much comes through) the part of `ramp` from `start` to `end`, which is on one line:
-/// there values are `a` and `b` above where `value` and `slope` say what the function is.
-fn with_line(before: vec4f, ramp: Ramp, start: f32, end: f32, value: vec4f, slope: vec4f, a: f32, b: f32) -> vec4f {
+/// The part of `ramp` from `start` to `end`, which is on one line: values are `a` to `b` above where `value` and `slope`
+/// say what the function is. Its colour, and how much comes through.
+fn on_line(ramp: Ramp, start: f32, end: f32, value: vec4f, slope: vec4f, a: f32, b: f32) -> vec4f {
     let l = (end - start) * ramp.length;
-    let x = (value.x + slope.x * a) * l;
-    let y = (value.x + slope.x * b) * l;
-    let p = mild(select(y, x, ramp.rises), select(x, y, ramp.rises));
+    let middle = (a + b) * 0.5;
+    let rise = (b - a) * ramp.sign;
+    let p = mild(fma(slope.x, middle, value.x) * l, slope.x * rise * l);
     // The weighted mean of the colours at both ends is that of one place.
-    let at_b = select(p.y - p.z, p.z, ramp.rises);
-    let emitted = (value.yzw * p.y + slope.yzw * (a * p.y + (b - a) * at_b)) * select(1.0, l, DIRECT);
-    return joined(ramp, before, emitted, 1.0 - p.x);
+    let place = fma(middle, p.y, rise * (p.z - 0.5 * p.y));
+    return vec4f(fma(slope.yzw, vec3f(place), value.yzw * p.y) * select(1.0, l, DIRECT), p.w);
 }
 
 /// Premultiplied colour and opacity of a segment whose cell's least value is `least`, in as many equal steps from front
@@ -31,9 +30,9 @@ fn by_lines(front: f32, back: f32, length: f32, least: f32, words: Words) -> vec
     var light = vec4f(0.0, 0.0, 0.0, 1.0);
     var step = 0.0;
     loop {
-        let start = select(1.0 - (step + 1.0) * width, step * width, ramp.rises);
+        let start = select(1.0 - (step + 1.0) * width, step * width, ramp.sign > 0.0);
         let sum = through_lines(ramp, start, start + width, least, words);
-        light = vec4f(light.xyz + light.w * sum.xyz, light.w * sum.w);
+        light = vec4f(fma(sum.xyz, vec3f(light.w), light.xyz), light.w * sum.w);
         step += 1.0;
         work++;
         if step >= steps {

@@ -128,10 +128,11 @@ impl Lines {
                 None => ("end".into(), "high".into()),
                 Some(c) => (format!("at.{c}"), format!("min(high, begin.{c})")),
             };
-            format!(
-                "sum = with_line(sum, ramp, {start}, {end}, words[{value}], words[{slope}], {a}, {b} - {begin});
-                "
-            )
+            let part = format!("on_line(ramp, {start}, {end}, words[{value}], words[{slope}], {a}, {b} - {begin})");
+            match k {
+                0 => format!("var sum = {part};\n"),
+                _ => format!("sum = joined(ramp, sum, {part});\n"),
+            }
         };
         let last = self.words() - 1;
         [
@@ -157,9 +158,8 @@ impl Lines {
                 fn through_lines(ramp: Ramp, start: f32, end: f32, least: f32, words: Words) -> vec4f {{
                 let begin = words[LAST_LINE_WORD].xyz;
                 let at = clamp((begin - ramp.low) * ramp.share, vec3f(start), vec3f(end));
-                let low = ramp.low + ramp.range * start;
-                let high = ramp.low + ramp.range * end;
-                var sum = vec4f(0.0, 0.0, 0.0, 1.0);
+                let low = fma(ramp.range, start, ramp.low);
+                let high = fma(ramp.range, end, ramp.low);
                 "
             ),
             (0..lines).map(through).collect(),
@@ -167,7 +167,10 @@ impl Lines {
                 "return sum;
                 }}
                 {integrated} {{ return by_lines(last_of(front), last_of(back), length, last_of(least), words); }}
-                {STRAIGHT}"
+                {}",
+                std::env::var("HX")
+                    .map_or(STRAIGHT.to_owned(), |d| std::fs::read_to_string(format!("{d}/project_straight.wgsl"))
+                        .unwrap())
             ),
         ]
         .concat()

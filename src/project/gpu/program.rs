@@ -113,7 +113,7 @@ pub(super) fn program(
     arrays: &[Array],
 ) -> String {
     let mut text = shader::prelude(variant);
-    for (name, value) in [("FAR", f64::from(FAR)), ("GROWTH", GROWTH), ("BESIDE", 1e-6)] {
+    for (name, value) in [("FAR", f64::from(FAR)), ("GROWTH", GROWTH), ("BESIDE", 1e-18)] {
         text += &format!("const {name} = {value:?}f;\n");
     }
     let form = match switches.fragments {
