@@ -13,6 +13,9 @@ struct Frame {
     /// The ray at (x, y) starts at x origin[0] + y origin[1] and runs along direction · (1, x, y).
     origin: array<vec4f, 2>,
     direction: array<vec4f, 3>,
+    /// The same by columns and rows, in the mesh's own coordinates: see `affine`.
+    starts: array<Twice, 3>,
+    ways: array<Twice, 3>,
     /// Width and height of the image, in pixels.
     size: vec2f,
     /// From a pixel's centre to its sample, in units of x and y.

@@ -28,9 +28,10 @@ fn way(a: Point, b: Point) -> vec3f {
     return (high_of(b) - high_of(a)) + (low_of(b) - low_of(a));
 }
 
-/// A tetrahedron: its corners, and the ways from the first to the others.
+/// A tetrahedron: its corners, the first of them in the mesh's own coordinates, and the ways from it to the others.
 struct Solid {
     p: array<vec3f, 4>,
+    a: Twice,
     b: vec3f,
     c: vec3f,
     d: vec3f,
@@ -41,7 +42,7 @@ fn solid_of(cell: vec4u) -> Solid {
     let b = points(cell.y);
     let c = points(cell.z);
     let d = points(cell.w);
-    return Solid(array<vec3f, 4>(place(a), place(b), place(c), place(d)), way(a, b), way(a, c), way(a, d));
+    return Solid(array<vec3f, 4>(place(a), place(b), place(c), place(d)), Twice(high_of(a), low_of(a)), way(a, b), way(a, c), way(a, d));
 }
 
 fn values_of(cell: u32, corners: vec4u) -> array<Value, 4> {

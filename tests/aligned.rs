@@ -156,6 +156,17 @@ fn fans_from_lattice_points_lose_nothing() {
     report.finish("perspective");
 }
 
+/// Of two projected cells that share a face in which a ray lies, one is met. The order does not matter in an even medium.
+#[test]
+fn projected_cells_lose_nothing() {
+    let mut report = Report::default();
+    let views: Vec<_> = parallel_views().into_iter().chain(perspective_views()).collect();
+    for (name, scene, half) in lattices() {
+        hold(&mut report, &[Engine::Project], name, (&scene, half), &views);
+    }
+    report.finish("projected");
+}
+
 /// Faces that lie beside one another without being shared: rounding must not open a gap between them.
 #[test]
 fn t_junctions_hold_light_from_everywhere() {

@@ -55,3 +55,13 @@ pub(crate) fn twice(v: DVec3) -> [[f32; 3]; 2] {
     let high = v.as_vec3();
     [high, (v - high.as_dvec3()).as_vec3()].map(|v| v.to_array())
 }
+
+/// What the shader computes v · (1, i, j) from: the products of pixels and high parts are exact.
+pub(crate) fn affine([first, by_column, by_row]: [DVec3; 3]) -> [[[f32; 4]; 2]; 3] {
+    let short = |v: DVec3| {
+        let high = v.as_vec3().to_array().map(|x| f32::from_bits(x.to_bits() & !0x3fff));
+        let low = (v - DVec3::from(high.map(f64::from))).as_vec3();
+        [[high[0], high[1], high[2], 0.0], low.extend(0.0).to_array()]
+    };
+    [twice(first).map(|[x, y, z]| [x, y, z, 0.0]), short(by_column), short(by_row)]
+}

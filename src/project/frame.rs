@@ -2,6 +2,7 @@
 
 use crate::field::Kind;
 use crate::geometry::Geometry;
+use crate::gpu::arrays;
 use crate::integral::{Exact, Knots};
 use crate::view::{Fan, View};
 use bytemuck::{Pod, Zeroable};
@@ -30,6 +31,8 @@ pub(super) struct Frame {
     forward: [f32; 4],
     origin: [[f32; 4]; 2],
     direction: [[f32; 4]; 3],
+    starts: [[[f32; 4]; 2]; 3],
+    ways: [[[f32; 4]; 2]; 3],
     size: [f32; 2],
     offset: [f32; 2],
     near: f32,
@@ -89,6 +92,8 @@ impl Seen {
             forward: four(inverse.row(2), if perspective { fan.ahead } else { 0.0 }),
             origin: [fan.origin[1], fan.origin[2]].map(|v| four(v, 0.0)),
             direction: fan.direction.map(|v| four(v, 0.0)),
+            starts: arrays::affine(fan.by_pixel(fan.origin, view.size())),
+            ways: arrays::affine(fan.by_pixel(fan.direction, view.size())),
             size: view.size().map(|n| n as f32),
             offset: fan.offset.as_vec2().to_array(),
             near: limit(fan.near),

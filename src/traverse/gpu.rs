@@ -281,8 +281,8 @@ impl Traverse {
             .collect();
         let ends = ends(view, &fan, geometry.scale);
         let frame = Frame {
-            origin: affine(fan.by_pixel(fan.origin, [w, h])),
-            direction: affine(fan.by_pixel(fan.direction, [w, h])),
+            origin: arrays::affine(fan.by_pixel(fan.origin, [w, h])),
+            direction: arrays::affine(fan.by_pixel(fan.direction, [w, h])),
             size: [w, h],
             first_row: 0,
             rows: 0,
@@ -439,16 +439,6 @@ fn ends(view: &View, fan: &Fan, scale: f64) -> Vec<f32> {
         ((ray.t_max * scale * cos - fan.ahead) as f32).clamp(-FAR, FAR)
     };
     pixels.into_par_iter().map(end).collect()
-}
-
-/// What the shader computes v · (1, i, j) from: the products of pixels and high parts are exact.
-fn affine([first, by_column, by_row]: [DVec3; 3]) -> [[[f32; 4]; 2]; 3] {
-    let short = |v: DVec3| {
-        let high = v.as_vec3().to_array().map(|x| f32::from_bits(x.to_bits() & !0x3fff));
-        let low = (v - DVec3::from(high.map(f64::from))).as_vec3();
-        [[high[0], high[1], high[2], 0.0], low.extend(0.0).to_array()]
-    };
-    [arrays::twice(first).map(|[x, y, z]| [x, y, z, 0.0]), short(by_column), short(by_row)]
 }
 
 /// Six times the volume of a tetrahedron.

@@ -28,6 +28,8 @@ use std::path::{Path, PathBuf};
 pub(crate) enum Engine {
     /// The traverse engine on the CPU, on so many threads.
     Twin { threads: usize },
+    /// The projection engine on the device under test; draws nothing if there is none.
+    Project,
     /// The judge itself, for the tests that know the answer without it.
     Reference,
 }
@@ -74,6 +76,11 @@ impl Engine {
         match self {
             Engine::Twin { threads } => {
                 let mut renderer = Renderer::with_device(threads, DeviceChoice::Cpu).unwrap();
+                set(&mut renderer, scene);
+                views.iter().map(|view| renderer.render(view, &|_| ()).unwrap()).collect()
+            }
+            Engine::Project => {
+                let Some(mut renderer) = on_device(render::Engine::Project) else { return vec![] };
                 set(&mut renderer, scene);
                 views.iter().map(|view| renderer.render(view, &|_| ()).unwrap()).collect()
             }
