@@ -2,7 +2,7 @@
 
 /// The intervals of the function that are not empty, LINES_ACROSS in a row: value, slope, and below each other the two
 /// ends and the number of the next. A texture, as drivers in software look buffers up lane by lane.
-@group(0) @binding(10) var lines: texture_2d<f32>;
+@group(0) @binding(10) var lines: texture_storage_2d<rgba32float, read>;
 
 /// A line of the function, between which values it is that, and the interval above; the last has itself there.
 struct Line {
@@ -15,8 +15,8 @@ struct Line {
 /// The interval of the function that begins at the knot `i`.
 fn line_of(i: u32) -> Line {
     let at = vec2u(i % LINES_ACROSS, 3u * (i / LINES_ACROSS));
-    let ends = textureLoad(lines, at + vec2u(0u, 2u), 0);
-    return Line(textureLoad(lines, at, 0), textureLoad(lines, at + vec2u(0u, 1u), 0), ends.xy, u32(ends.z));
+    let ends = textureLoad(lines, at + vec2u(0u, 2u));
+    return Line(textureLoad(lines, at), textureLoad(lines, at + vec2u(0u, 1u)), ends.xy, u32(ends.z));
 }
 
 /// The interval that a constant `s` is in.

@@ -83,7 +83,7 @@ pub(crate) fn lines(gpu: &Gpu, exact: &Exact<f32>) -> Result<Texture> {
         .collect();
     let size = [across as u32, 3 * down as u32];
     let format = wgpu::TextureFormat::Rgba32Float;
-    let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
+    let usage = wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_DST;
     let texture = Texture::new(gpu, "lines", wgpu::TextureDimension::D2, [size[0], size[1], 1], format, usage)?;
     texture.write(gpu, [0; 3], size, bytemuck::cast_slice(&texels));
     Ok(texture)

@@ -135,7 +135,7 @@ pub(crate) enum Slot {
     Volume,
     /// An array of two-dimensional textures that are filtered.
     Layers,
-    /// A two-dimensional texture that is not filtered.
+    /// A two-dimensional texture of four floats that is read texel by texel.
     Texels,
     /// A sampler that filters.
     Sampler,
@@ -144,8 +144,8 @@ pub(crate) enum Slot {
 /// The layout of a group whose bindings are numbered from 0, for `stages`.
 pub(crate) fn layout(gpu: &Gpu, stages: wgpu::ShaderStages, slots: &[Slot]) -> wgpu::BindGroupLayout {
     let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
-    let texture = |view_dimension, filterable| wgpu::BindingType::Texture {
-        sample_type: wgpu::TextureSampleType::Float { filterable },
+    let texture = |view_dimension| wgpu::BindingType::Texture {
+        sample_type: wgpu::TextureSampleType::Float { filterable: true },
         view_dimension,
         multisampled: false,
     };
@@ -158,9 +158,13 @@ pub(crate) fn layout(gpu: &Gpu, stages: wgpu::ShaderStages, slots: &[Slot]) -> w
                 Slot::Uniform => buffer(wgpu::BufferBindingType::Uniform),
                 Slot::Read => buffer(wgpu::BufferBindingType::Storage { read_only: true }),
                 Slot::Write => buffer(wgpu::BufferBindingType::Storage { read_only: false }),
-                Slot::Volume => texture(wgpu::TextureViewDimension::D3, true),
-                Slot::Layers => texture(wgpu::TextureViewDimension::D2Array, true),
-                Slot::Texels => texture(wgpu::TextureViewDimension::D2, false),
+                Slot::Volume => texture(wgpu::TextureViewDimension::D3),
+                Slot::Layers => texture(wgpu::TextureViewDimension::D2Array),
+                Slot::Texels => wgpu::BindingType::StorageTexture {
+                    access: wgpu::StorageTextureAccess::ReadOnly,
+                    format: wgpu::TextureFormat::Rgba32Float,
+                    view_dimension: wgpu::TextureViewDimension::D2,
+                },
                 Slot::Sampler => wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
             },
             count: None,
