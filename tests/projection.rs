@@ -73,6 +73,39 @@ fn one_colour_needs_no_order() {
     report.finish("one colour");
 }
 
+/// One cell has no order. Up to four lines of the function come with it, others are looked up; deep cells take steps.
+#[test]
+fn one_cell_is_exact() {
+    let Some(mut renderer) = renderer() else { return };
+    let mut report = Report::default();
+    let corners = [dvec3(-1.0, -0.8, -0.9), dvec3(0.9, -1.0, -0.2), dvec3(-0.1, 1.0, -0.6), dvec3(0.2, 0.1, 1.0)];
+    let mesh = draw::mesh_of(corners.to_vec(), [(10, &[0, 1, 2, 3][..])]);
+    for lines in 1..=7 {
+        for depth in [0.1, 2.0, 20.0, 400.0] {
+            for emission in [Emission::Chromatic, Emission::Direct { scale: 1.0 }] {
+                let case = format!("{lines} lines, depth {depth}, {emission:?}");
+                let mut random = Random::of(&case);
+                let values = (0..4).map(|_| random.within(-0.2, 0.2)).chain([0.0, 1.0]).skip(2);
+                let array = Array { name: "s".into(), components: 1, values: Values::F64(values.collect()) };
+                let places: Vec<f64> = (0..=lines).map(|i| -0.3 + 1.6 * f64::from(i) / f64::from(lines)).collect();
+                let opacity = places.iter().map(|&s| (s, random.within(0.0, depth))).collect();
+                let color = places.iter().map(|&s| (s, [0; 3].map(|_| random.within(0.0, 1.0)))).collect();
+                let transfer = TransferFunction::new(color, opacity, 1.0).unwrap().with_emission(emission).unwrap();
+                let scene = Scene::new(&mesh, array, Association::Point, |_| transfer);
+                set(&mut renderer, &scene);
+                for position in [dvec3(0.4, 0.3, 4.0), dvec3(-3.0, 1.0, -2.5), dvec3(0.05, 0.0, -0.2)] {
+                    let view = perspective(position, 60.0);
+                    let expected = Engine::Reference.image(&scene, &view);
+                    let got = image(&mut renderer, Switches::default(), &view);
+                    // What f32 tells of lengths.
+                    report.hold(&format!("{case}, from {position}"), &got, &expected, 2e-6 + 2e-7 * depth);
+                }
+            }
+        }
+    }
+    report.finish("one cell");
+}
+
 /// A peak of opacity in a field, seen at 60 degrees from near.
 fn peak() -> (Scene, View) {
     let mesh = generate::tetrahedra(9);

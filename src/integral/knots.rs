@@ -294,4 +294,20 @@ mod tests {
             assert!((got - want).abs() <= 1.01e-5 * want, "{s}: {got}, not {want}");
         }
     }
+
+    #[test]
+    fn as_many_lines_are_counted_as_values_can_be_on() {
+        // At −0.2 a step, whose interval is empty.
+        let places = [-0.8, -0.7, -0.2, -0.2, 0.1, 0.6];
+        let knots = Knots::<f64>::new(places.iter().map(|&s| (s, [1.0 + s; 4])).collect());
+        for (width, expected) in [(0.0, 1), (0.05, 2), (0.3, 3), (0.55, 3), (0.7, 4), (1.2, 5), (3.0, 6)] {
+            let on = |low: f64| {
+                let lines = knots.s.windows(2).filter(|k| k[0] < k[1] && k[0] < low + width && k[1] > low);
+                lines.count().max(1)
+            };
+            let seen = (0..=20_000).map(|i| on(-2.0 + f64::from(i) * 2e-4)).max();
+            assert_eq!((knots.lines_within(width), seen), (expected, Some(expected)), "{width}");
+        }
+        assert_eq!(knots.steepest(), 1.6);
+    }
 }
