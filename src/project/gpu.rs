@@ -67,7 +67,8 @@ pub(crate) struct Project {
     values: Option<Chunks>,
     extent: Option<Extent>,
     function: Option<HeldFunction>,
-    program: Option<Program>,
+    /// The last ones, that of this frame first.
+    programs: Vec<Program>,
     canvas: Option<Canvas>,
     ordered: Option<Ordered>,
     table: table::Held,
@@ -121,7 +122,7 @@ impl Project {
             values: None,
             extent: None,
             function: None,
-            program: None,
+            programs: vec![],
             canvas: None,
             ordered: None,
             table: table::Held::default(),
@@ -289,7 +290,7 @@ impl Pass {
     fn new(project: &Project, seen: &Seen) -> Result<Self> {
         let gpu = &project.gpu;
         let (Some(HeldFunction { buffers: function, lines, filled }), Some(program), Some(table)) =
-            (&project.function, &project.program, project.table.get())
+            (&project.function, project.programs.first(), project.table.get())
         else {
             return Err(unprepared());
         };

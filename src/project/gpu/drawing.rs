@@ -64,7 +64,7 @@ impl Project {
     /// Projects and draws all batches.
     pub(super) fn draw(&self, frame: &Pass, view: &View, counts: &mut Counts) -> Result<Vec<[f32; 4]>> {
         let gpu = &self.gpu;
-        let (Some(program), Some(canvas), Some(ordered)) = (&self.program, &self.canvas, &self.ordered) else {
+        let (Some(program), Some(canvas), Some(ordered)) = (self.programs.first(), &self.canvas, &self.ordered) else {
             return Err(unprepared());
         };
         let format = canvas.format;

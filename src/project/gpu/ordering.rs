@@ -86,7 +86,7 @@ impl Project {
     /// returned.
     fn classify(&self, frame: &Pass, cells: usize, mut read: Option<Reader>) -> Result<Buffer> {
         let gpu = &self.gpu;
-        let program = self.program.as_ref().ok_or_else(unprepared)?;
+        let program = self.programs.first().ok_or_else(unprepared)?;
         let at_once = if read.is_some() { CLASSIFIED } else { cells };
         let size = 4 * cells.min(at_once) as u64;
         let keys = Buffer::new(gpu, "keys", size, Usage::STORAGE | Usage::COPY_SRC)?;

@@ -30,6 +30,9 @@ const INTERPOLATED: [&str; 2] = [
     include_str!("../../../shaders/project_interpolated_draw.wgsl"),
 ];
 
+/// Programs that are kept: edits of the function, and what cuts rays off, go to and fro between some.
+const KEPT: usize = 4;
+
 /// How much an outline is grown, in pixels: rasterisers round corners to this.
 const GROWTH: f64 = 1.0 / 256.0;
 
@@ -59,7 +62,8 @@ impl Project {
     ) -> Result<()> {
         let compositing = switches.compositing;
         let same = |p: &Program| p.source == source && p.format == format && p.compositing == compositing;
-        if self.program.as_ref().is_some_and(same) {
+        if let Some(known) = self.programs.iter().position(same) {
+            self.programs[..=known].rotate_right(1);
             return Ok(());
         }
         let gpu = &self.gpu;
@@ -97,7 +101,8 @@ impl Project {
             compositing,
         };
         gpu.check()?;
-        self.program = Some(program);
+        self.programs.insert(0, program);
+        self.programs.truncate(KEPT);
         Ok(())
     }
 }
