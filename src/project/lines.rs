@@ -167,10 +167,7 @@ impl Lines {
                 "return sum;
                 }}
                 {integrated} {{ return by_lines(last_of(front), last_of(back), length, last_of(least), words); }}
-                {}",
-                std::env::var("HX")
-                    .map_or(STRAIGHT.to_owned(), |d| std::fs::read_to_string(format!("{d}/project_straight.wgsl"))
-                        .unwrap())
+                {STRAIGHT}"
             ),
         ]
         .concat()
