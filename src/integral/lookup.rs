@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::field;
 
 /// What bounds the error of a uniform volume whose size nobody said, where a table of 256 x 256 x 128 can hold that. It
-/// is the worst case, some 20 times what is seen.
+/// is the worst case, some 10 times what is seen.
 const UNIFORM_ERROR: f64 = 0.02;
 
 /// What bounds the error of other tables that are smaller than the number of knots asks for.

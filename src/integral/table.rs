@@ -14,7 +14,7 @@ mod polynomial;
 mod sampled;
 mod volume;
 
-pub use bound::{bound, bound_of_normalised, bound_of_polynomial, size, values_of_normalised, values_of_polynomial};
+pub use bound::{bound_of_polynomial, bound_of_volume, size, values_of_normalised, values_of_polynomial};
 pub use cylindrical::Cylindrical;
 pub use linear::Linear;
 pub use polynomial::Polynomial;

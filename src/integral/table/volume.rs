@@ -9,7 +9,7 @@
 
 use super::closed::{self, Both, Runs};
 use super::grid::Grid;
-use super::{between, is_scalar, light, published, reconstructed, value};
+use super::{between, bound_of_volume, is_scalar, light, published, reconstructed, value};
 use crate::integral::{Exact, Light};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -164,6 +164,12 @@ impl Table {
         }
         let [r, g, b, density] = sum;
         reconstructed([r, g, b], density, l, self.direct)
+    }
+
+    /// [`bound_of_volume`] of a table of this kind and size, with as many values behind as in front.
+    pub fn bound(&self, exact: &Exact<f64>) -> Option<f64> {
+        let [values, behind, slices] = self.size;
+        (values == behind).then(|| bound_of_volume(exact, self.kind, [values, slices], self.longest)).flatten()
     }
 
     /// Bytes of its texels as 32-bit floats.
