@@ -100,7 +100,7 @@ impl Lookup {
         let (direct, kind, degree) = (exact.direct, choice.lengths, choice.degree);
         let stored = match choice.form {
             Form::Volume => {
-                Some(Stored::Volume(Table { kind, size: [front, back, depth], longest, direct, texels: vec![] }))
+                Some(Stored::Volume(Table { kind, size: [front, back, depth], longest, direct, texels: vec![].into() }))
             }
             Form::Polynomial => {
                 let texels = vec![vec![]; degree as usize + 1];
@@ -208,8 +208,8 @@ impl Lookup {
                 };
                 let (slice, share) = between(slices / (n - 1) as f32, n);
                 let (i, j, area) = (between(f, w), between(b, h), w as usize * h as usize);
-                let near = bilinear(&t.texels[slice * area..], w, i, j);
-                let texel = mix(near, bilinear(&t.texels[(slice + 1) * area..], w, i, j), share);
+                let slices = &t.texels[slice * area..];
+                let texel = mix(bilinear(slices, w, i, j), bilinear(&slices[area..], w, i, j), share);
                 if t.kind == Kind::LogNormalised { self.reconstructed(texel, length) } else { texel }
             }
             Stored::Polynomial(t) => {

@@ -12,6 +12,7 @@ mod incremental;
 mod linear;
 mod polynomial;
 mod sampled;
+mod storage;
 mod volume;
 
 pub use bound::{bound_of_polynomial, bound_of_volume, size, values_of_normalised, values_of_polynomial};
@@ -19,6 +20,7 @@ pub use cylindrical::Cylindrical;
 pub use linear::Linear;
 pub use polynomial::Polynomial;
 pub use sampled::{Sampling, Steps};
+pub use storage::Storage;
 pub use volume::{Kind, Table, coordinate, length};
 
 pub(crate) use grid::Nodes;

@@ -284,7 +284,8 @@ fn published_constructions_come_near() {
     for (name, exact) in functions() {
         for kind in [Kind::Uniform, Kind::Log] {
             let apart_from = |table: &Table, want: &Table| {
-                let all = table.texels.iter().zip(&want.texels).flat_map(|(g, w)| (0..4).map(move |k| g[k] - w[k]));
+                let all =
+                    table.texels.iter().zip(want.texels.iter()).flat_map(|(g, w)| (0..4).map(move |k| g[k] - w[k]));
                 let sum: f64 = all.map(|d| f64::from(d).powi(2)).sum();
                 assert!(sum.is_finite(), "{name} {kind:?}");
                 (sum / (4 * want.texels.len()) as f64).sqrt()
@@ -348,7 +349,7 @@ fn cheaper_texels_cost_what_they_should() {
         table
             .texels
             .iter()
-            .zip(&fine.texels)
+            .zip(fine.texels.iter())
             .map(|(g, w)| (0..4).map(|k| (g[k] - w[k]).powi(2)).sum::<f32>())
             .sum::<f32>()
     });
