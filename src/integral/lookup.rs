@@ -1,7 +1,7 @@
 //! Tables as engines read them: in 32 bits, with texels rounded to what a device stores.
 
 use super::choice::{Alpha, Choice, Form, Planes, Texels};
-use super::table::{Cylindrical, Kind, Polynomial, Table, length};
+use super::table::{Cylindrical, Kind, Polynomial, Table, length, mix};
 use super::{Exact, Light, opacity_of_depth, table};
 use crate::error::{Error, Result};
 use crate::field;
@@ -68,7 +68,7 @@ impl Lookup {
         Self::of(exact, choice, stored)
     }
 
-    /// The same, in the memory of `old` where that fits, which need not be cleared again: that takes half of the time.
+    /// The same, in the memory of `old` where that fits, which need not be had anew: where pages are small, that takes half of the time.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -343,11 +343,6 @@ fn between(x: f32, n: u32) -> (usize, f32) {
     let at = x.clamp(0.0, 1.0) * (n - 1) as f32;
     let low = (at as u32).min(n - 2);
     (low as usize, at - low as f32)
-}
-
-#[inline(always)]
-fn mix(a: [f32; 4], b: [f32; 4], share: f32) -> [f32; 4] {
-    std::array::from_fn(|k| a[k] + (b[k] - a[k]) * share)
 }
 
 #[inline(always)]

@@ -49,6 +49,12 @@ fn between(x: f64, n: u32) -> [(usize, f64); 2] {
     [(low as usize, 1.0 - share), (low as usize + 1, share)]
 }
 
+/// `a`, and as much of the way to `b` as `share` says.
+#[inline(always)]
+pub(crate) fn mix(a: [f32; 4], b: [f32; 4], share: f32) -> [f32; 4] {
+    std::array::from_fn(|k| a[k] + (b[k] - a[k]) * share)
+}
+
 /// Colour and opacity of a segment `l` long, from its colour over what is seen of it and its mean extinction.
 fn reconstructed(color: [f64; 3], density: f64, l: f64, direct: bool) -> [f64; 4] {
     let alpha = -(-l * density).exp_m1();

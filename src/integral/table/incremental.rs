@@ -8,7 +8,7 @@
 use super::closed;
 use super::grid::Grid;
 use super::volume::{Kind, Table, length};
-use super::{Storage, is_scalar};
+use super::{Storage, is_scalar, mix};
 use crate::integral::Exact;
 use rayon::prelude::*;
 
@@ -16,11 +16,6 @@ use rayon::prelude::*;
 #[inline(always)]
 fn over(front: [f32; 4], behind: [f32; 4]) -> [f32; 4] {
     std::array::from_fn(|k| front[k] + (1.0 - front[3]) * behind[k])
-}
-
-#[inline(always)]
-fn mix(a: [f32; 4], b: [f32; 4], share: f32) -> [f32; 4] {
-    std::array::from_fn(|k| a[k] + (b[k] - a[k]) * share)
 }
 
 impl Table {

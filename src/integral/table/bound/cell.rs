@@ -46,8 +46,8 @@ pub(super) fn row<'a>(intervals: &'a [Interval], sums: &'a [f64], i: usize) -> i
             cell.gap_over = if k.own_gap > 0.0 { k.own_gap / k.own[0][0] } else { 0.0 };
         }
         if j == i + 1 {
-            cell.gap = cell.gap.min(first.own_gap + k.between[0] + k.own_gap);
-            cell.gap_colour = cell.gap_colour.min(first.own_gap_colour + k.between[1] + k.own_gap_colour);
+            cell.gap = cell.gap.min(first.own_gap + k.below[0] + k.own_gap);
+            cell.gap_colour = cell.gap_colour.min(first.own_gap_colour + k.below[1] + k.own_gap_colour);
         }
         let [least, most] = cell.hull[0];
         (cell.density, cell.spread, cell.off) = (cell.hull[0], most - least, cell.gap.min(most - least));
