@@ -422,7 +422,7 @@ fn errors_are_within_their_bounds() {
         let mut hold = |what: &str, bound: Option<f64>, look_up: &(dyn Fn(f64, f64, f64) -> [f64; 4] + Sync)| {
             let share =
                 Judged { exact, bound: bound.unwrap(), look_up }.share(&segments, 2.0 / f64::from(n - 1), longest);
-            if !(0.07..=1.0).contains(&share) {
+            if !(0.05..=1.0).contains(&share) {
                 wrong.push(format!("{name}, direct {}, {what}, {n}, {longest}: {share:.3} of the bound", exact.direct));
             }
         };
