@@ -328,7 +328,7 @@ impl Constructor {
     ) -> Result<Option<(Table, f64)>> {
         let plan = Plan::volume(&self.exact, kind, size, longest, construction);
         let Some((texels, ms)) = self.run(plan)? else { return Ok(None) };
-        Ok(Some((Table { kind, size, longest, direct: self.exact.direct, texels }, ms)))
+        Ok(Some((Table { kind, size, longest, direct: self.exact.direct, texels: texels.into() }, ms)))
     }
 
     /// Polynomials in closed form, and the milliseconds that the device took. `None` as [`Polynomial::new`], and for

@@ -1,13 +1,13 @@
 //! Tables as engines read them: in 32 bits, with texels rounded to what a device stores.
 
 use super::choice::{Alpha, Choice, Form, Planes, Texels};
-use super::table::{Cylindrical, Kind, Polynomial, Table, length};
+use super::table::{Cylindrical, Kind, Polynomial, Table, length, mix};
 use super::{Exact, Light, opacity_of_depth, table};
 use crate::error::{Error, Result};
 use crate::field;
 
 /// What bounds the error of a uniform volume whose size nobody said, where a table of 256 x 256 x 128 can hold that. It
-/// is the worst case, some 20 times what is seen.
+/// is the worst case, some 10 times what is seen.
 const UNIFORM_ERROR: f64 = 0.02;
 
 /// What bounds the error of other tables that are smaller than the number of knots asks for.
@@ -68,7 +68,7 @@ impl Lookup {
         Self::of(exact, choice, stored)
     }
 
-    /// The same, in the memory of `old` where that fits, which need not be cleared again: that takes half of the time.
+    /// The same, in the memory of `old` where that fits, which need not be had anew: where pages are small, that takes half of the time.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -100,7 +100,7 @@ impl Lookup {
         let (direct, kind, degree) = (exact.direct, choice.lengths, choice.degree);
         let stored = match choice.form {
             Form::Volume => {
-                Some(Stored::Volume(Table { kind, size: [front, back, depth], longest, direct, texels: vec![] }))
+                Some(Stored::Volume(Table { kind, size: [front, back, depth], longest, direct, texels: vec![].into() }))
             }
             Form::Polynomial => {
                 let texels = vec![vec![]; degree as usize + 1];
@@ -208,8 +208,8 @@ impl Lookup {
                 };
                 let (slice, share) = between(slices / (n - 1) as f32, n);
                 let (i, j, area) = (between(f, w), between(b, h), w as usize * h as usize);
-                let near = bilinear(&t.texels[slice * area..], w, i, j);
-                let texel = mix(near, bilinear(&t.texels[(slice + 1) * area..], w, i, j), share);
+                let slices = &t.texels[slice * area..];
+                let texel = mix(bilinear(slices, w, i, j), bilinear(&slices[area..], w, i, j), share);
                 if t.kind == Kind::LogNormalised { self.reconstructed(texel, length) } else { texel }
             }
             Stored::Polynomial(t) => {
@@ -343,11 +343,6 @@ fn between(x: f32, n: u32) -> (usize, f32) {
     let at = x.clamp(0.0, 1.0) * (n - 1) as f32;
     let low = (at as u32).min(n - 2);
     (low as usize, at - low as f32)
-}
-
-#[inline(always)]
-fn mix(a: [f32; 4], b: [f32; 4], share: f32) -> [f32; 4] {
-    std::array::from_fn(|k| a[k] + (b[k] - a[k]) * share)
 }
 
 #[inline(always)]

@@ -12,13 +12,15 @@ mod incremental;
 mod linear;
 mod polynomial;
 mod sampled;
+mod storage;
 mod volume;
 
-pub use bound::{bound, bound_of_normalised, bound_of_polynomial, size, values_of_normalised, values_of_polynomial};
+pub use bound::{bound_of_polynomial, bound_of_volume, size, values_of_normalised, values_of_polynomial};
 pub use cylindrical::Cylindrical;
 pub use linear::Linear;
 pub use polynomial::Polynomial;
 pub use sampled::{Sampling, Steps};
+pub use storage::Storage;
 pub use volume::{Kind, Table, coordinate, length};
 
 pub(crate) use grid::Nodes;
@@ -45,6 +47,12 @@ fn between(x: f64, n: u32) -> [(usize, f64); 2] {
     let low = (at as u32).min(n - 2);
     let share = at - f64::from(low);
     [(low as usize, 1.0 - share), (low as usize + 1, share)]
+}
+
+/// `a`, and as much of the way to `b` as `share` says.
+#[inline(always)]
+pub(crate) fn mix(a: [f32; 4], b: [f32; 4], share: f32) -> [f32; 4] {
+    std::array::from_fn(|k| a[k] + (b[k] - a[k]) * share)
 }
 
 /// Colour and opacity of a segment `l` long, from its colour over what is seen of it and its mean extinction.

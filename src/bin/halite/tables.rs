@@ -88,10 +88,6 @@ struct Row {
     max: f64,
 }
 
-/// Forms whose errors have bounds, as have polynomials.
-const UNIFORM: &str = "volume, uniform";
-const NORMALISED: &str = "volume, log-normalised";
-
 /// Logarithmic lengths.
 const OCTAVES: u32 = 16;
 
@@ -200,28 +196,21 @@ fn forms<'a>(
 ) -> Vec<Form<'a>> {
     let m = options.entries;
     let mut forms = vec![];
-    let mut add = |name, construction: &'static str, size: String, build: Build<'a>| {
-        // Few bits cost what they cost besides.
-        let bound = match name {
-            _ if construction.ends_with("bits") => None,
-            UNIFORM => table::bound(exact, n, lengths, longest),
-            NORMALISED => table::bound_of_normalised(exact, n, OCTAVES, longest),
-            _ => POLYNOMIALS
-                .into_iter()
-                .find(|p| p.0 == name)
-                .and_then(|(_, degree)| table::bound_of_polynomial(exact, degree, n, longest)),
-        };
+    let mut add = |name, construction: &'static str, size: String, bound: Option<f64>, build: Build<'a>| {
+        // Bounds are those of texels that hold the integral, as few bits and numeric integration do not let them.
+        let bound = bound.filter(|_| construction == "f64" || construction.ends_with("closed"));
         forms.push(Form { name, construction, size, bound, build });
     };
     for (name, kind, slices) in [
-        (UNIFORM, table::Kind::Uniform, lengths),
+        ("volume, uniform", table::Kind::Uniform, lengths),
         ("volume, log", table::Kind::Log, OCTAVES),
-        (NORMALISED, table::Kind::LogNormalised, OCTAVES),
+        ("volume, log-normalised", table::Kind::LogNormalised, OCTAVES),
     ] {
         let (size, text) = ([n, n, slices], format!("{n}x{n}x{slices}"));
+        let bound = table::bound_of_volume(exact, kind, [n, slices], longest);
         let sampling = [Sampling::same(m, 1.0), Sampling::touched(m, 2.0)];
         let mut volume = |construction, make: Box<dyn Fn() -> Option<Table> + 'a>| {
-            add(name, construction, text.clone(), Box::new(move || Ok(make().map(of_volume))));
+            add(name, construction, text.clone(), bound, Box::new(move || Ok(make().map(of_volume))));
         };
         volume("f64", Box::new(move || Table::new(exact, kind, size, longest)));
         volume("closed", Box::new(move || Table::closed(exact, kind, size, longest)));
@@ -241,17 +230,24 @@ fn forms<'a>(
                 let built = device.volume(kind, size, longest, how)?;
                 Ok(built.map(|(table, ms)| Built { ms: Some(ms), ..of_volume(table) }))
             };
-            add(name, construction, text.clone(), Box::new(build));
+            add(name, construction, text.clone(), bound, Box::new(build));
         }
     }
     let size = format!("{n}x{n}");
-    add("linear opacity", "f64", size.clone(), Box::new(move || Ok(Linear::new(exact, n, longest).map(of_linear))));
-    add("linear opacity", "closed", size, Box::new(move || Ok(Linear::closed(exact, n, longest).map(of_linear))));
+    add(
+        "linear opacity",
+        "f64",
+        size.clone(),
+        None,
+        Box::new(move || Ok(Linear::new(exact, n, longest).map(of_linear))),
+    );
+    add("linear opacity", "closed", size, None, Box::new(move || Ok(Linear::closed(exact, n, longest).map(of_linear))));
     for (name, degree) in POLYNOMIALS {
         let size = format!("{n}x{n}x{}", degree + 1);
+        let bound = table::bound_of_polynomial(exact, degree, n, longest);
         let mut polynomial = |construction, bits: u32, make: Box<dyn Fn() -> Option<Polynomial> + 'a>| {
             let build = move || Ok(make().map(|table| of_polynomial(table, bits)));
-            add(name, construction, size.clone(), Box::new(build));
+            add(name, construction, size.clone(), bound, Box::new(build));
         };
         let closed = move || Polynomial::closed(exact, degree, n, longest);
         polynomial("f64", 32, Box::new(move || Polynomial::new(exact, degree, n, longest)));
@@ -263,7 +259,7 @@ fn forms<'a>(
                 let built = device.polynomial(degree, n, longest)?;
                 Ok(built.map(|(table, ms)| Built { ms: Some(ms), ..of_polynomial(table, 32) }))
             };
-            add(name, "device, closed", size, Box::new(build));
+            add(name, "device, closed", size, bound, Box::new(build));
         }
     }
     // A cylinder has a plane at each bend of its mapping, which are a quarter apart.
@@ -276,14 +272,14 @@ fn forms<'a>(
         let size = format!("{n}x{n}x{planes}");
         let f64 = move || Ok(Cylindrical::new(exact, planes, n, longest).map(of_cylinder));
         let closed = move || Ok(Cylindrical::closed(exact, planes, n, longest).map(of_cylinder));
-        add(name, "f64", size.clone(), Box::new(f64));
-        add(name, "closed", size.clone(), Box::new(closed));
+        add(name, "f64", size.clone(), None, Box::new(f64));
+        add(name, "closed", size.clone(), None, Box::new(closed));
         if let Some(device) = device {
             let build = move || {
                 let built = device.cylindrical(planes, n, longest)?;
                 Ok(built.map(|(table, ms)| Built { ms: Some(ms), ..of_cylinder(table) }))
             };
-            add(name, "device, closed", size, Box::new(build));
+            add(name, "device, closed", size, None, Box::new(build));
         }
     }
     forms

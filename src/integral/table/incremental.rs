@@ -7,8 +7,8 @@
 
 use super::closed;
 use super::grid::Grid;
-use super::is_scalar;
 use super::volume::{Kind, Table, length};
+use super::{Storage, is_scalar, mix};
 use crate::integral::Exact;
 use rayon::prelude::*;
 
@@ -16,11 +16,6 @@ use rayon::prelude::*;
 #[inline(always)]
 fn over(front: [f32; 4], behind: [f32; 4]) -> [f32; 4] {
     std::array::from_fn(|k| front[k] + (1.0 - front[3]) * behind[k])
-}
-
-#[inline(always)]
-fn mix(a: [f32; 4], b: [f32; 4], share: f32) -> [f32; 4] {
-    std::array::from_fn(|k| a[k] + (b[k] - a[k]) * share)
 }
 
 impl Table {
@@ -32,7 +27,7 @@ impl Table {
         if !is_scalar(exact) || n < 3 || size[1] != size[0] || size[2] < 3 || kind == Kind::LogNormalised {
             return None;
         }
-        let mut texels = vec![[0.0; 4]; n * n * size[2] as usize];
+        let mut texels = Storage::zeroed(n * n * size[2] as usize);
         let (done, rest) = texels.split_at_mut(2 * n * n);
         done[n * n..].copy_from_slice(&closed::slice(&Grid::new(exact, size[0]), length(kind, size[2], longest, 1)));
         let first = &done[n * n..];

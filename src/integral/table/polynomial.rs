@@ -8,7 +8,7 @@
 use super::closed::{self, Both, Runs};
 use super::grid::Grid;
 use super::volume::{OPAQUE_DEPTH, Pieces, normalised};
-use super::{between, is_scalar, reconstructed, value};
+use super::{between, bound_of_polynomial, is_scalar, reconstructed, value};
 use crate::integral::Exact;
 use rayon::prelude::*;
 
@@ -207,6 +207,11 @@ impl Polynomial {
             }
         }
         rounded
+    }
+
+    /// [`bound_of_polynomial`] of a table of this size.
+    pub fn bound(&self, exact: &Exact<f64>) -> Option<f64> {
+        bound_of_polynomial(exact, self.degree, self.size, self.longest)
     }
 
     /// Bytes of its texels as 32-bit floats.

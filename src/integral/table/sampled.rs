@@ -4,7 +4,7 @@
 //! hardware blends them; or as a program may, at least twice as many as the segment touches.
 
 use super::volume::{Kind, Table, length};
-use super::{grid, is_scalar, value};
+use super::{Storage, grid, is_scalar, value};
 use crate::integral::Exact;
 use crate::integral::opacity_of_depth;
 use crate::real::Real;
@@ -92,7 +92,7 @@ impl Table {
                 };
             }
         };
-        let mut texels = vec![[0.0; 4]; w as usize * h as usize * n as usize];
+        let mut texels = Storage::zeroed(w as usize * h as usize * n as usize);
         texels.par_chunks_mut(w as usize).enumerate().for_each(|(at, texels)| row(at, texels));
         Some(Table { kind, size, longest, direct: exact.direct, texels })
     }

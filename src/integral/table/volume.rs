@@ -9,7 +9,7 @@
 
 use super::closed::{self, Both, Runs};
 use super::grid::Grid;
-use super::{between, is_scalar, light, published, reconstructed, value};
+use super::{Storage, between, bound_of_volume, is_scalar, light, published, reconstructed, value};
 use crate::integral::{Exact, Light};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -41,7 +41,7 @@ pub struct Table {
     pub direct: bool,
     /// Colour and opacity, or what stands for them; the value in front varies fastest, the length slowest. f32 would
     /// not change what f64 finds, but for rounding it once.
-    pub texels: Vec<[f32; 4]>,
+    pub texels: Storage,
 }
 
 /// Lengths that are integrated side by side, and distances of values of which texels are written at a time.
@@ -78,8 +78,8 @@ impl Table {
                 column.map(|t| t.map(|c| c as f32)).collect()
             })
             .collect();
-        let texels = (0..lengths.len()).flat_map(|k| columns.iter().map(move |c| c[k])).collect();
-        Some(Table { kind, size, longest, direct: exact.direct, texels })
+        let texels: Vec<_> = (0..lengths.len()).flat_map(|k| columns.iter().map(move |c| c[k])).collect();
+        Some(Table { kind, size, longest, direct: exact.direct, texels: texels.into() })
     }
 
     /// The same table, to f32, in a time per texel that does not depend on the function (`closed.rs` says how), where
@@ -91,7 +91,7 @@ impl Table {
         if !is_scalar(exact) || size[2] < 3 {
             return None;
         }
-        let texels = vec![[0.0; 4]; size.iter().map(|&n| n as usize).product()];
+        let texels = Storage::zeroed(size.iter().map(|&n| n as usize).product());
         let mut table = Table { kind, size, longest, direct: exact.direct, texels };
         table.fill(&Grid::new(exact, size[0]));
         Some(table)
@@ -164,6 +164,12 @@ impl Table {
         }
         let [r, g, b, density] = sum;
         reconstructed([r, g, b], density, l, self.direct)
+    }
+
+    /// [`bound_of_volume`] of a table of this kind and size, with as many values behind as in front.
+    pub fn bound(&self, exact: &Exact<f64>) -> Option<f64> {
+        let [values, behind, slices] = self.size;
+        (values == behind).then(|| bound_of_volume(exact, self.kind, [values, slices], self.longest)).flatten()
     }
 
     /// Bytes of its texels as 32-bit floats.
