@@ -28,6 +28,8 @@ use std::path::{Path, PathBuf};
 pub(crate) enum Engine {
     /// The traverse engine on the CPU, on so many threads.
     Twin { threads: usize },
+    /// The same engine on the device to test: see [`on_device`].
+    Device,
     /// The judge itself, for the tests that know the answer without it.
     Reference,
 }
@@ -68,12 +70,17 @@ impl Scene {
 }
 
 impl Engine {
-    /// One image for each of `views`.
+    /// One image for each of `views`; none if there is no device to test.
     pub(crate) fn draw(self, scene: &Scene, views: &[View]) -> Vec<Image> {
         let Scene { mesh, tetrahedra, field, transfer } = scene;
         match self {
             Engine::Twin { threads } => {
                 let mut renderer = Renderer::with_device(threads, DeviceChoice::Cpu).unwrap();
+                set(&mut renderer, scene);
+                views.iter().map(|view| renderer.render(view, &|_| ()).unwrap()).collect()
+            }
+            Engine::Device => {
+                let Some(mut renderer) = on_device(render::Engine::Traverse) else { return vec![] };
                 set(&mut renderer, scene);
                 views.iter().map(|view| renderer.render(view, &|_| ()).unwrap()).collect()
             }
