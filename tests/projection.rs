@@ -326,3 +326,29 @@ fn cells_that_hold_the_eye_are_clipped_not_dropped() {
         assert!(interpolated < bound && intersected < 1e-5);
     }
 }
+
+/// In a parallel view nothing is near an eye: cells are drawn once, with a clipping range too.
+#[test]
+fn parallel_views_with_a_clipping_range_draw_cells_once() {
+    let Some(mut renderer) = renderer() else { return };
+    let (scene, _) = holes();
+    set(&mut renderer, &scene);
+    let camera = Camera {
+        position: dvec3(3.0, 2.0, 4.0),
+        focal_point: DVec3::ZERO,
+        view_up: DVec3::Y,
+        projection: Projection::Parallel { parallel_scale: 1.5 },
+    };
+    let all = View::new(camera, [40, 40]).unwrap();
+    let part = all.clone().with_clipping_range([3.0, 5.4]).unwrap();
+    let expected = Engine::Reference.image(&scene, &part);
+    for fragments in [INTERPOLATED, Fragments::Linear, Fragments::Intersected] {
+        let switches = Switches { fragments, ..Switches::default() };
+        image(&mut renderer, switches, &all);
+        let whole = renderer.stats().projection.unwrap().drawn_cells;
+        let error = image(&mut renderer, switches, &part).compare(&expected).unwrap();
+        let drawn = renderer.stats().projection.unwrap().drawn_cells;
+        eprintln!("{fragments:?}: {drawn} of {whole} cells, rmse {:.1e}, max {:.1e}", error.rmse, error.max);
+        assert!(drawn <= whole && error.rmse < 2e-3);
+    }
+}
