@@ -343,7 +343,7 @@ fn parts_of_a_cell_are_drawn_from_back_to_front() {
         // Inside, or a little outside.
         let shares = [(); 4].map(|()| r.within(-0.1, 1.0));
         let eye = points.iter().zip(shares).map(|(p, s)| *p * s).sum::<DVec3>() / shares.iter().sum::<f64>();
-        let mesh = draw::mesh_of(points, [(10, &[0, 1, 2, 3][..])].into_iter());
+        let mesh = draw::mesh_of(points, [(10, &[0, 1, 2, 3][..])]);
         let values = Values::F64(vec![-1.0, -0.4, 0.3, 1.0]);
         let array = Array { name: "s".into(), components: 1, values };
         let scene = Scene::new(&mesh, array, Association::Point, |_| {
