@@ -102,13 +102,18 @@ fn dot_fma(a: vec3f, b: vec3f) -> f32 {
 /// their rounding leaves (Dekker 1971), as faces seen edge-on are nothing but that.
 fn area(a: vec4f, b: vec4f) -> f32 {
     let c = b.yx;
-    let p = a.xy * c;
+    let p = rounded(a.xy * c);
     let a_high = shortened_pair(a.xy);
     let c_high = shortened_pair(c);
     let a_low = a.xy - a_high;
     let c_low = c - c_high;
     let rest = (((a_high * c_high - p) + a_high * c_low) + a_low * c_high) + a_low * c_low;
     return (p.x - p.y) + (rest.x - rest.y);
+}
+
+/// `v` rounded to f32: a product that is not fused with what follows, as [`computed`] has it.
+fn rounded(v: vec2f) -> vec2f {
+    return max(v, vec2f(-3e38));
 }
 
 fn shortened_pair(v: vec2f) -> vec2f {

@@ -45,8 +45,15 @@ fn write_vertex(i: u32, k: u32, corner: vec2f, front: Value, back: Value, depths
     records[i].vertices[k].depths = depths;
 }
 
-/// The piece of a cell that lies behind the plane at the depth `frame.nearest`. With one corner behind it, the first
-/// piece is all; with two or three, a wedge is left, which is three tetrahedra.
+/// Whether the eye and `apex` are on the same side of a face.
+fn is_before(face: array<vec3f, 3>, apex: vec3f) -> bool {
+    let n = cross(face[1] - face[0], face[2] - face[0]);
+    let eye = -frame.direction[0].xyz * frame.forward.w;
+    return dot(eye - face[0], n) * dot(apex - face[0], n) > 0.0;
+}
+
+/// The piece of a cell that lies behind the plane at the depth `frame.nearest`; the first is the farthest. With one
+/// corner behind the plane, the first piece is all; with two or three, a wedge is left, which is three tetrahedra.
 fn cut(whole: array<vec3f, 4>, whole_values: array<Value, 4>, piece: u32) -> Piece {
     // Corners behind the plane first.
     var behind = array<u32, 4>(0u, 1u, 2u, 3u);
@@ -65,50 +72,42 @@ fn cut(whole: array<vec3f, 4>, whole_values: array<Value, 4>, piece: u32) -> Pie
             behind[last] = i;
         }
     }
-    if first == 4u || first == 0u {
+    if first == 4u || first == 0u || (first == 1u && piece > 0u) {
         return Piece(p, v, first == 4u && piece == 0u);
     }
-    // The six corners of what is left: those behind the plane, and where edges cross it.
+    // The six corners of the wedge: those behind the plane, and where edges cross it. One triangle of it is 0, 1, 2;
+    // the edges to the other end in 3, 4, 5. Any four in sequence are a tetrahedron. With two corners behind, either
+    // has a triangle with its two crossings; with three, one triangle is the crossings.
     var corners: array<vec3f, 6>;
     var values: array<Value, 6>;
-    var n = 0u;
     for (var i = 0u; i < first; i++) {
+        let a = behind[i];
+        let own = select(3u + i, 3u * i, first == 2u);
+        corners[own] = p[a];
+        values[own] = v[a];
         for (var j = first; j < 4u; j++) {
-            let a = behind[i];
             let b = behind[j];
             let share = depths[a] / (depths[a] - depths[b]);
+            let n = select(select(j - 1u, own + j - 1u, first == 2u), i, first == 3u);
             corners[n] = p[a] + (p[b] - p[a]) * share;
             values[n] = v[a] + (v[b] - v[a]) * share;
-            n++;
         }
     }
-    var at = vec4u(0u, 1u, 2u, 3u);
-    if first == 1u {
-        if piece > 0u {
-            return Piece(p, v, false);
-        }
-        corners[3] = p[behind[0]];
-        values[3] = v[behind[0]];
-    } else {
-        if first == 2u {
-            // Two triangles: a corner behind and its two crossings; the crossings are 0, 1 and 2, 3.
-            corners[4] = p[behind[0]];
-            values[4] = v[behind[0]];
-            corners[5] = p[behind[1]];
-            values[5] = v[behind[1]];
-            at = select(select(vec4u(4u, 0u, 1u, 5u), vec4u(0u, 1u, 5u, 2u), piece == 1u), vec4u(1u, 5u, 2u, 3u), piece == 2u);
-        } else {
-            // Two triangles: the crossings 0, 1, 2 and the corners behind, 3, 4, 5.
-            for (var i = 0u; i < 3u; i++) {
-                corners[3u + i] = p[behind[i]];
-                values[3u + i] = v[behind[i]];
-            }
-            at = select(select(vec4u(0u, 1u, 2u, 3u), vec4u(1u, 2u, 3u, 4u), piece == 1u), vec4u(2u, 3u, 4u, 5u), piece == 2u);
-        }
+    // The first and the last tetrahedron are each cut off by a plane: they are before or behind both of the others.
+    var at = 0u;
+    if first > 1u {
+        let first_before = is_before(array<vec3f, 3>(corners[1], corners[2], corners[3]), corners[0]);
+        let last_before = is_before(array<vec3f, 3>(corners[2], corners[3], corners[4]), corners[5]);
+        let sequence = select(
+            select(vec3u(0u, 2u, 1u), vec3u(0u, 1u, 2u), last_before),
+            select(vec3u(2u, 1u, 0u), vec3u(1u, 0u, 2u), last_before),
+            first_before,
+        );
+        at = sequence[piece];
     }
     for (var i = 0u; i < 4u; i++) {
-        p[i] = corners[at[i]];
-        v[i] = values[at[i]];
+        p[i] = corners[at + i];
+        v[i] = values[at + i];
     }
     return Piece(p, v, true);
 }

@@ -76,6 +76,8 @@ var<private> steps: u32;
 /// Whether all of the ray was walked: llvmpipe leaves loops after 65,535 iterations of all loops of 8 rays together, so
 /// that rays which take much work are given up before, and the CPU draws them.
 var<private> finished: bool;
+/// Whether the ray may pass edges of the boundary as closely as it does.
+var<private> anyhow: bool;
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -126,13 +128,16 @@ fn clipped(limits: vec2f, height: f32, slope: f32) -> vec2f {
     return vec2f(limits.x, select(limits.y, -FAR, height < 0.0));
 }
 
-/// Follows a ray. No ray gets lost in theory; should one, it is followed again beside its place.
+/// Follows a ray. One that passes too close to an edge of the boundary is followed again beside its place: where faces
+/// of the boundary touch without sharing their corners, rounding could let it slip through, or see some of it twice. No
+/// ray gets lost in theory; should one, the same is done.
 fn trace(straight: Ray, limits: vec2f) {
     var ray = straight;
     for (var attempt = 1u; attempt <= 3u; attempt++) {
         light = vec4f(0.0, 0.0, 0.0, 1.0);
         largest = Value(-FAR);
         finished = false;
+        anyhow = attempt == 3u;
         follow(ray, limits);
         if finished || work > frame.most_work {
             return;
@@ -159,7 +164,9 @@ fn follow(ray: Ray, limits: vec2f) {
     }
     var entry = Entry(-FAR, 0u);
     loop {
-        find_entries(ray, inverse, entry, limits.y);
+        if !find_entries(ray, inverse, entry, limits.y) {
+            return;
+        }
         for (var k = 0u; k < known && work <= frame.most_work; k++) {
             work++;
             entry = ahead[k];
@@ -186,9 +193,11 @@ fn span(b: Box, ray: Ray, inverse: vec3f) -> vec2f {
     return vec2f(max(max(near.x, near.y), near.z) - SLACK, min(min(far.x, far.y), far.z) + SLACK);
 }
 
-/// Finds the first faces that the ray enters through after `last` and before `limit`.
-fn find_entries(ray: Ray, inverse: vec3f, last: Entry, limit: f32) {
+/// Finds the first faces that the ray enters through after `last` and before `limit`; false if it is too close to an
+/// edge of any.
+fn find_entries(ray: Ray, inverse: vec3f, last: Entry, limit: f32) -> bool {
     known = 0u;
+    var clear = true;
     var farthest = limit;
     // The children of node n are 2n and 2n + 1; the root is node 1.
     var n = 1u;
@@ -216,6 +225,7 @@ fn find_entries(ray: Ray, inverse: vec3f, last: Entry, limit: f32) {
                 let entry = Entry(depth.x + depth.y, k);
                 if entry.t < limit && (last.t == -FAR || is_before(last, entry)) {
                     insert(entry);
+                    clear = clear && is_clear(face);
                     farthest = select(limit, ahead[AHEAD - 1u].t, known == AHEAD);
                 }
             }
@@ -227,6 +237,17 @@ fn find_entries(ray: Ray, inverse: vec3f, last: Entry, limit: f32) {
             break;
         }
     }
+    return clear;
+}
+
+/// Whether a ray passes a face of the boundary beside its edges, as far as places across it can tell.
+fn is_clear(face: Face) -> bool {
+    if anyhow {
+        return true;
+    }
+    let across = max(max(abs(face.a.xy), abs(face.b.xy)), abs(face.c.xy));
+    let edges = vec3f(distance(face.b.xy, face.c.xy), distance(face.c.xy, face.a.xy), distance(face.a.xy, face.b.xy));
+    return all(face.areas > CLOSE * max(across.x, across.y) * edges);
 }
 
 fn is_before(a: Entry, b: Entry) -> bool {
@@ -345,7 +366,7 @@ fn walk(ray: Ray, entry: Entry, limits: vec2f) -> bool {
         let beyond = vec4u(left_behind) == c.corners;
         cell = select(select(select(c.neighbours.w, c.neighbours.z, beyond.z), c.neighbours.y, beyond.y), c.neighbours.x, beyond.x);
         if cell == NONE {
-            return true;
+            return is_clear(face);
         }
     }
     return false;

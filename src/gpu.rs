@@ -255,8 +255,7 @@ impl Gpu {
     /// What went wrong since the device was opened.
     ///
     /// # Errors
-    /// [`Error::Lost`] if the device is gone, [`Error::Memory`] if it has no more memory, [`Error::Device`] if it
-    /// refused a call.
+    /// [`Error::Lost`] if the device is gone, [`Error::Device`] if it has no more memory or refused a call.
     pub(crate) fn check(&self) -> Result<()> {
         let fault = || self.fault.lock().unwrap_or_else(PoisonError::into_inner);
         if fault().is_some() {
@@ -270,7 +269,11 @@ impl Gpu {
             Some(Fault::Lost(why)) => Err(Error::Lost(format!("{name} was lost ({why})"))),
             Some(Fault::OutOfMemory) => {
                 *fault = None;
-                Err(Error::Memory { device: name.clone(), needed: self.allocated(), allowed: self.budget })
+                let bytes = self.allocated();
+                Err(Error::Device(format!(
+                    "{name} refused memory that it was asked for, with which {bytes} bytes would be allocated; a smaller \
+                     picture, another device, or \"cpu\", may do"
+                )))
             }
             Some(Fault::Refused(what)) => {
                 *fault = None;

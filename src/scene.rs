@@ -115,6 +115,8 @@ impl Scene {
             Error::malformed(path, if key == "." { what } else { format!("{key}: {what}") })
         })?;
         json.end().map_err(|e| Error::malformed(path, format!("after the scene: {e}")))?;
+        let value: Value = serde_json::from_slice(&text).map_err(|e| Error::malformed(path, e.to_string()))?;
+        file::check(&value).map_err(|what| Error::malformed(path, what))?;
         file.scene(path)
     }
 

@@ -442,9 +442,14 @@ impl View {
     }
 }
 
+/// Pixels of an image.
+const MOST_PIXELS: u64 = 1 << 28;
+
 fn check_size([w, h]: [u32; 2]) -> Result<()> {
-    if w == 0 || h == 0 || u64::from(w) * u64::from(h) > 1 << 28 {
-        return Err(Error::View(format!("an image of {w}x{h} pixels")));
+    if w == 0 || h == 0 || u64::from(w) * u64::from(h) > MOST_PIXELS {
+        return Err(Error::View(format!(
+            "an image of {w}x{h} pixels; it has at least 1x1, and not more than {MOST_PIXELS} together"
+        )));
     }
     Ok(())
 }

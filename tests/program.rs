@@ -116,6 +116,15 @@ fn usage() {
     place.misused("render cube.vtu --out x.png --range 1:0", "--range");
     place.misused("render cube.vtu --out x.png --background 1,2", "--background");
     place.misused("render cube.vtu --out x.png --clip 0,0,0,0,0,0", "normal");
+    place.misused("render cube.vtu --out x.png --device cpu --integral volume --table 1x1x1", "at least 2");
+    place.misused("render cube.vtu --out x.png --integral volume --table 256x256", "256x256x16");
+    place.misused("render cube.vtu --out x.png --integral polynomial --degree 9", "--degree");
+    place.misused("render cube.vtu --out x.png --engine traverse --fragments linear --dither", "--fragments, --dither");
+    place.misused("study cube.vtu --out x.png --gain nan", "--gain");
+    place.misused("tables cube.vtu --gain 0", "--gain");
+    place.misused("study cube.vtu --out x.png --order none --lengths log", "--order, --lengths");
+    place.misused("study cube.vtu --out x.png --engine traverse", "--engine");
+    place.misused("study cube.vtu --out x.png --table 64x64", "64x64x16");
     assert!(place.succeeds("--version").starts_with("halite "));
     assert!(place.succeeds("render --help").contains("--unit-distance"));
 }
@@ -158,7 +167,11 @@ fn failures_are_one_line() {
         place.write(name, &SCENE.replace("\"size\"", &format!("\"integral\": {integral}, \"size\"")));
         place.fails(&format!("render {name} --out x.png --device cpu"), &[name, "integral", part]);
     }
-    place.fails("render cube.vtu --out x.png --device cpu --integral volume --table 1x1x1", &["at least 2", "exact"]);
+    place.write("list.json", &SCENE.replace("\"size\"", "\"projection\": [\"linear\"], \"size\""));
+    place.fails("render list.json --out x.png --device cpu", &["list.json", "projection", "object"]);
+    place.fails("study scene.json --out x.png --blend maximum", &["maximum", "--blend composite"]);
+    place.fails("study scene.json --out x.png --blend maximum --integrals", &["maximum"]);
+    place.fails("render cube.vtu --out x.png --size 20000x20000", &["20000x20000", "268435456"]);
     place.fails("render lost.json --out x.png", &["lost.vtu"]);
     place.fails("render scene.json --out x.gif", &["x.gif", ".png"]);
     place.fails("render scene.json --out no/x.png", &["no/x.png", "folder"]);
@@ -328,6 +341,16 @@ fn variants_of_the_projection_engine() {
     let variants = study["variants"].as_array().unwrap();
     let exact = variants.iter().find(|v| v["variant"] == "intersected, exact").unwrap();
     assert!(variants.len() > 12 && exact["rmse"].as_f64().unwrap() < 1e-2, "{study}");
+    // What a scene asks for can be switched off.
+    let switches = r#""engine": "project", "projection": {"target": "rgba8", "dither": true}, "size""#;
+    place.write("dithered.json", &SCENE.replace("\"size\"", switches));
+    let draw = |options: &str| {
+        place.succeeds(&format!("render dithered.json --out a.npy {options}"));
+        std::fs::read(place.path("a.npy")).unwrap()
+    };
+    assert!(draw("") == draw("--dither") && draw("--dither=false") != draw(""));
+    let Ran(code, _, err) = place.run("study dithered.json --out sheet.png --frames 1");
+    assert!(code == Some(0) && err.contains("projection"), "{err}");
     let Ran(code, out, err) = place
         .run("study cube.vtu --integrals --table 16x16x8 --out forms.png --json forms.json --frames 1 --size 24x16");
     assert_eq!((code, err.as_str()), (Some(0), ""));

@@ -359,3 +359,64 @@ fn cells_that_hold_the_eye_are_clipped_not_dropped() {
         assert!(interpolated < bound && intersected < 1e-5);
     }
 }
+
+/// Cells that the eye is in or beside are cut at the plane through it: their parts must be blended in sequence, which
+/// bands of many colours in a single cell show.
+#[test]
+fn parts_of_a_cell_are_drawn_from_back_to_front() {
+    let Some(mut renderer) = renderer() else { return };
+    let mut report = Report::default();
+    for i in 0..rounds(24) {
+        let mut r = Random::of(&format!("a cell around the eye {i}"));
+        let points: Vec<DVec3> = (0..4).map(|_| r.point(1.0)).collect();
+        let volume = (points[1] - points[0]).cross(points[2] - points[0]).dot(points[3] - points[0]).abs() / 6.0;
+        if volume < 0.1 {
+            continue;
+        }
+        // Inside, or a little outside.
+        let shares = [(); 4].map(|()| r.within(-0.1, 1.0));
+        let eye = points.iter().zip(shares).map(|(p, s)| *p * s).sum::<DVec3>() / shares.iter().sum::<f64>();
+        let mesh = draw::mesh_of(points, [(10, &[0, 1, 2, 3][..])]);
+        let values = Values::F64(vec![-1.0, -0.4, 0.3, 1.0]);
+        let array = Array { name: "s".into(), components: 1, values };
+        let scene = Scene::new(&mesh, array, Association::Point, |_| {
+            let color = vec![(-1.0, [1.0, 0.1, 0.0]), (0.0, [0.1, 0.9, 0.1]), (1.0, [0.0, 0.1, 1.0])];
+            TransferFunction::new(color, vec![(-1.0, 2.0), (0.0, 0.5), (1.0, 3.0)], 0.5).unwrap()
+        });
+        let projection = Projection::Perspective { view_angle: 100.0 };
+        let camera = Camera { position: eye, focal_point: eye + r.direction(), view_up: r.direction(), projection };
+        let view = View::new(camera, [40, 40]).unwrap();
+        let view = if i % 3 == 0 { view.with_clipping_range([0.15, 10.0]).unwrap() } else { view };
+        let expected = Engine::Reference.image(&scene, &view);
+        set(&mut renderer, &scene);
+        let switches = Switches { fragments: INTERPOLATED, ..Switches::default() };
+        report.hold(&format!("cell {i}"), &image(&mut renderer, switches, &view), &expected, 2e-3);
+    }
+    report.finish("parts of a cell");
+}
+
+/// In a parallel view nothing is near an eye: cells are drawn once, with a clipping range too.
+#[test]
+fn parallel_views_with_a_clipping_range_draw_cells_once() {
+    let Some(mut renderer) = renderer() else { return };
+    let (scene, _) = holes();
+    set(&mut renderer, &scene);
+    let camera = Camera {
+        position: dvec3(3.0, 2.0, 4.0),
+        focal_point: DVec3::ZERO,
+        view_up: DVec3::Y,
+        projection: Projection::Parallel { parallel_scale: 1.5 },
+    };
+    let all = View::new(camera, [40, 40]).unwrap();
+    let part = all.clone().with_clipping_range([3.0, 5.4]).unwrap();
+    let expected = Engine::Reference.image(&scene, &part);
+    for fragments in [INTERPOLATED, Fragments::Linear, Fragments::Intersected] {
+        let switches = Switches { fragments, ..Switches::default() };
+        image(&mut renderer, switches, &all);
+        let whole = renderer.stats().projection.unwrap().drawn_cells;
+        let error = image(&mut renderer, switches, &part).compare(&expected).unwrap();
+        let drawn = renderer.stats().projection.unwrap().drawn_cells;
+        eprintln!("{fragments:?}: {drawn} of {whole} cells, rmse {:.1e}, max {:.1e}", error.rmse, error.max);
+        assert!(drawn <= whole && error.rmse < 2e-3);
+    }
+}

@@ -184,6 +184,12 @@ impl Choice {
         let [front, back, depth] = size;
         let wrong = match self.form {
             Form::Auto | Form::Exact => return Ok(()),
+            Form::Volume if depth == 0 => Some(format!(
+                "a volume has three sizes, the last for lengths, such as {front}x{back}x16, and here are two"
+            )),
+            Form::Cylindrical if depth == 0 => Some(format!(
+                "a cylinder has three sizes, the last for planes, such as {front}x{front}x256, and here are two"
+            )),
             Form::Volume if front < 2 || back < 2 || depth < 3 => {
                 Some("a table has at least 2, 2 and 3 texels along its axes".to_owned())
             }
@@ -242,6 +248,8 @@ mod tests {
             assert!(message.contains(part) && message.contains("exact"), "{message}");
         };
         refused(Form::Volume, [1, 2, 3], 2, "at least 2, 2 and 3");
+        refused(Form::Volume, [256, 256, 0], 2, "256x256x16");
+        refused(Form::Cylindrical, [64, 64, 0], 2, "64x64x256");
         refused(Form::Volume, [4096, 4096, 64], 2, "bytes");
         refused(Form::Polynomial, [64, 64, 0], 9, "degree");
         refused(Form::Polynomial, [1, 64, 0], 2, "2 x 2");

@@ -13,6 +13,9 @@ const UNIFORM_ERROR: f64 = 0.02;
 /// What bounds the error of other tables that are smaller than the number of knots asks for.
 const SMALL_ERROR: f64 = 2e-3;
 
+/// Texels of one length by which a range is chosen.
+const SOME: usize = 1024;
+
 /// A table of one of the forms.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Stored {
@@ -136,15 +139,25 @@ impl Lookup {
             Texels::Unorm16 => 65535.0,
             Texels::Unorm8 => 255.0,
         };
+        let density = if levels > 0.0 { self.density_span(f64::from(levels)) } else { None };
         let parts: Vec<(Range, &mut [[f32; 4]])> = match &mut self.stored {
-            Stored::Volume(t) => vec![(from_zero(t.greatest()), &mut t.texels)],
+            Stored::Volume(t) => {
+                let [r, g, b, most] = t.greatest();
+                vec![(from_zero([r, g, b, density.unwrap_or(most)]), &mut t.texels)]
+            }
             Stored::Cylindrical(t) => {
                 let [r, g, b, _] = greatest(&t.texels);
                 let colour = r.max(g).max(b);
                 vec![(from_zero([colour, colour, colour, 1.0]), &mut t.texels)]
             }
             // Coefficients may be negative.
-            Stored::Polynomial(t) => t.texels.iter_mut().map(|t| (within(t), &mut t[..])).collect(),
+            Stored::Polynomial(t) => {
+                let mut parts: Vec<_> = t.texels.iter_mut().map(|t| (within(t), &mut t[..])).collect();
+                if let (Some((range, _)), Some(most)) = (parts.first_mut(), density) {
+                    (range.least[3], range.span[3]) = (0.0, most);
+                }
+                parts
+            }
         };
         for (range, texels) in parts {
             if levels == 0.0 {
@@ -156,6 +169,49 @@ impl Lookup {
             }
             self.ranges.push(range);
         }
+    }
+
+    /// The greatest mean extinction that texels of so many levels are to tell; none for tables that hold opacities.
+    /// What is opaque has no greatest one, and all others would share the few levels that it leaves. So it is that with
+    /// which the opacities of some texels are off by least (their root mean square, where all lengths up to the longest
+    /// are as frequent): what is beyond is not wholly opaque in the shortest segments.
+    fn density_span(&self, levels: f64) -> Option<f32> {
+        // With direct emission colours are over what is seen of the length, and would change with it.
+        if self.direct {
+            return None;
+        }
+        // Mean extinctions and lengths.
+        let mut some: Vec<[f64; 2]> = vec![];
+        let mut take = |texels: &[[f32; 4]], l: f64| {
+            some.extend(texels.iter().step_by((texels.len() / SOME) | 1).map(|t| [f64::from(t[3]), l]));
+        };
+        let (longest, greatest) = (
+            self.longest(),
+            match &self.stored {
+                Stored::Volume(t) if t.kind == Kind::LogNormalised => {
+                    let slices = t.texels.chunks_exact(t.size[0] as usize * t.size[1] as usize);
+                    (0..).zip(slices).skip(1).for_each(|(k, s)| take(s, length(t.kind, t.size[2], t.longest, k)));
+                    t.greatest()[3]
+                }
+                Stored::Polynomial(t) => {
+                    let first = t.texels.first()?;
+                    (0..8).for_each(|k| take(first, t.longest * f64::from(-k).exp2()));
+                    greatest(first)[3]
+                }
+                _ => return None,
+            },
+        );
+        let error = |span: f32| {
+            let span = f64::from(span);
+            let errors = some.iter().map(|[density, l]| {
+                let rounded = ((density / span).min(1.0) * levels).round() / levels * span;
+                l * ((-l * rounded).exp() - (-l * density).exp()).powi(2)
+            });
+            errors.sum::<f64>()
+        };
+        let spans = (0..).map(|k| greatest * (-k as f32).exp2());
+        let spans = spans.take_while(|s| f64::from(*s) * longest > 1.0 || *s == greatest);
+        spans.map(|s| (error(s), s)).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, span)| span)
     }
 
     /// What was chosen.

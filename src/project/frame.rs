@@ -15,7 +15,8 @@ pub(super) const FAR: f32 = 1e30;
 /// Up to this distance from the mesh's centre, in normalised units, rays start at the eye.
 const NEAR_EYE: f64 = 2.0;
 
-/// Cells that reach nearer to the plane through the eye than this, in normalised units, are special.
+/// Cells that reach nearer to the plane through the eye of a perspective view than this, in normalised units, are
+/// special.
 const NEAREST: f64 = 1e-4;
 
 /// Equal parts of the values' range, for each of which it is known whether the function is empty there.
@@ -98,7 +99,7 @@ impl Seen {
             offset: fan.offset.as_vec2().to_array(),
             near: limit(fan.near),
             far: limit(fan.far),
-            nearest: (fan.near + fan.ahead).max(NEAREST) as f32,
+            nearest: if perspective { (fan.near + fan.ahead).max(NEAREST) as f32 } else { 0.0 },
             perspective: u32::from(perspective),
             planes: planes.len() as u32,
             unused: 0,

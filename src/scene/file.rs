@@ -159,6 +159,53 @@ enum DepthKindJson {
     Ray,
 }
 
+/// Refuses lists where an object is meant, of which serde would take the items for its keys in sequence, and null,
+/// which it would take for a key that is not there.
+pub(super) fn check(scene: &Value) -> Result<(), String> {
+    let Value::Object(keys) = scene else { return Err("a scene is an object".into()) };
+    let object = |at: &str, value: &Value| {
+        if value.is_object() { Ok(()) } else { Err(format!("{at}: an object is meant, and not {}", kind(value))) }
+    };
+    for (key, value) in keys {
+        // What is for others may be anything.
+        if !["widgets", "gradient_array", "tol", "truth_of"].contains(&key.as_str()) {
+            refuse_null(key, value)?;
+        }
+        match (key.as_str(), value) {
+            ("scalars" | "camera" | "depth" | "projection", _) => object(key, value)?,
+            ("integral", Value::String(_)) => {}
+            ("integral", _) => object(key, value).map_err(|e| e + "; or the name of a form")?,
+            ("clipping_planes" | "opaque", Value::Array(items)) => {
+                for (i, item) in items.iter().enumerate() {
+                    object(&format!("{key}[{i}]"), item)?;
+                }
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+fn refuse_null(at: &str, value: &Value) -> Result<(), String> {
+    match value {
+        Value::Null => Err(format!("{at}: null says nothing; leave the key out")),
+        Value::Array(items) => items.iter().enumerate().try_for_each(|(i, v)| refuse_null(&format!("{at}[{i}]"), v)),
+        Value::Object(keys) => keys.iter().try_for_each(|(k, v)| refuse_null(&format!("{at}.{k}"), v)),
+        _ => Ok(()),
+    }
+}
+
+fn kind(value: &Value) -> &'static str {
+    match value {
+        Value::Null => "null",
+        Value::Bool(_) => "true or false",
+        Value::Number(_) => "a number",
+        Value::String(_) => "a text",
+        Value::Array(_) => "a list",
+        Value::Object(_) => "an object",
+    }
+}
+
 impl File {
     /// Makes sense of it; files that it names are relative to the folder of `path`.
     pub(super) fn scene(mut self, path: &Path) -> Result<Scene> {

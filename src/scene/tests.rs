@@ -130,3 +130,23 @@ fn mistakes_are_named() {
     scene.size = [5, 3];
     assert!(scene.view().unwrap_err().to_string().contains("3x5"));
 }
+
+#[test]
+fn lists_are_no_objects_and_null_is_no_value() {
+    let refused = |keys: &str, parts: &[&str]| {
+        let message = with(keys).unwrap_err().to_string();
+        assert!(parts.iter().all(|p| message.contains(p)), "{keys}: {message}");
+    };
+    refused(r#""projection": []"#, &["projection", "object", "list"]);
+    refused(r#""projection": ["linear", "distance", "none"]"#, &["projection", "list"]);
+    refused(r#""projection": null"#, &["projection", "null"]);
+    refused(r#""integral": ["volume"]"#, &["integral", "list", "name"]);
+    refused(r#""integral": {"form": "volume", "table": null}"#, &["integral.table", "null"]);
+    refused(r#""clipping_planes": [[[0, 0, 1], [0, 0, 1]]]"#, &["clipping_planes[0]", "object"]);
+    refused(r#""opaque": [["sphere", [0, 0, 0], 1, [1, 1, 1]]]"#, &["opaque[0]"]);
+    refused(r#""depth": ["depth.npy", "ray"]"#, &["depth", "object"]);
+    refused(r#""background": null"#, &["background", "null"]);
+    let list = open(r#"{"name": "s", "component": 1, "association": "cell"}"#, r#"["s", "cell", 1]"#);
+    assert!(list.unwrap_err().to_string().contains("scalars: an object"));
+    with(r#""tol": null, "integral": "exact""#).unwrap();
+}

@@ -62,7 +62,11 @@ const NEAR_EYE: f64 = 2.0;
 /// Entries that a ray finds at a time.
 const AHEAD: usize = 8;
 
-/// How far aside, in normalised units, a lost ray is tried again.
+/// A ray this close to an edge of the boundary, relative to the face's extent across it, is tried again beside its
+/// place: above most rounding of places across a ray.
+const CLOSE: f32 = 2e-7;
+
+/// How far aside, in normalised units.
 const ASIDE: f32 = 2e-7;
 
 /// `Frame` in the shader.
@@ -403,6 +407,7 @@ fn program(variant: &Variant, association: &str, blend: Blend, table: Option<&Lo
         ("INVISIBLE", f64::from(arrays::INVISIBLE)),
         ("BLUR", f64::from(BLUR)),
         ("SLACK", f64::from(MARGIN)),
+        ("CLOSE", f64::from(CLOSE)),
         ("ASIDE", f64::from(ASIDE)),
         ("LEAST_LIGHT", f64::from(least_light(variant.direct))),
     ] {

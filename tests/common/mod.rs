@@ -28,8 +28,8 @@ use std::path::{Path, PathBuf};
 pub(crate) enum Engine {
     /// The traverse engine on the CPU, on so many threads.
     Twin { threads: usize },
-    /// The projection engine on the device under test; draws nothing if there is none.
-    Project,
+    /// An engine on the device to test: see [`on_device`]. Draws nothing if there is none.
+    Device(render::Engine),
     /// The judge itself, for the tests that know the answer without it.
     Reference,
 }
@@ -70,7 +70,7 @@ impl Scene {
 }
 
 impl Engine {
-    /// One image for each of `views`.
+    /// One image for each of `views`; none if there is no device to test.
     pub(crate) fn draw(self, scene: &Scene, views: &[View]) -> Vec<Image> {
         let Scene { mesh, tetrahedra, field, transfer } = scene;
         match self {
@@ -79,8 +79,8 @@ impl Engine {
                 set(&mut renderer, scene);
                 views.iter().map(|view| renderer.render(view, &|_| ()).unwrap()).collect()
             }
-            Engine::Project => {
-                let Some(mut renderer) = on_device(render::Engine::Project) else { return vec![] };
+            Engine::Device(engine) => {
+                let Some(mut renderer) = on_device(engine) else { return vec![] };
                 set(&mut renderer, scene);
                 views.iter().map(|view| renderer.render(view, &|_| ()).unwrap()).collect()
             }

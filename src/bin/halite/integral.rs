@@ -1,5 +1,6 @@
 //! The form of the ray integral, as options and in scenes.
 
+use crate::output::misuse;
 use crate::variant::{named, table};
 use anyhow::{Context, Result, bail};
 use clap::Args;
@@ -22,7 +23,7 @@ pub(crate) struct Integral {
     #[arg(long, value_name = "KIND", value_parser = named::<Kind>, help_heading = "Integral")]
     lengths: Option<Kind>,
     /// Degree of polynomials, 1 to 8 [default: 2]
-    #[arg(long, value_name = "N", help_heading = "Integral")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=8), help_heading = "Integral")]
     degree: Option<u32>,
     /// How the opacity of polynomials depends on the length: exponential, or linear
     #[arg(long, value_name = "KIND", value_parser = named::<Alpha>, help_heading = "Integral")]
@@ -31,8 +32,9 @@ pub(crate) struct Integral {
     #[arg(long, value_name = "KIND", value_parser = named::<Planes>, help_heading = "Integral")]
     planes: Option<Planes>,
     /// Read one pair of a cylinder's planes in each interpolated cell, as parallel views always do
-    #[arg(long, help_heading = "Integral")]
-    plane_per_cell: bool,
+    #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true",
+        help_heading = "Integral")]
+    plane_per_cell: Option<bool>,
     /// What the table's texels are: float, unorm16 or unorm8
     #[arg(long, value_name = "FORMAT", value_parser = named::<Texels>, help_heading = "Integral")]
     texels: Option<Texels>,
@@ -51,9 +53,32 @@ impl Integral {
             degree: self.degree.unwrap_or(choice.degree),
             alpha: self.alpha.unwrap_or(choice.alpha),
             planes: self.planes.unwrap_or(choice.planes),
-            per_cell: self.plane_per_cell || choice.per_cell,
+            per_cell: self.plane_per_cell.unwrap_or(choice.per_cell),
             texels: self.texels.unwrap_or(choice.texels),
             build: self.build.unwrap_or(choice.build),
+        }
+    }
+
+    /// The names of the options that were given and are not the table's size.
+    pub(crate) fn given(&self) -> Vec<&'static str> {
+        let all = [
+            ("--integral", self.integral.is_some()),
+            ("--lengths", self.lengths.is_some()),
+            ("--degree", self.degree.is_some()),
+            ("--alpha", self.alpha.is_some()),
+            ("--planes", self.planes.is_some()),
+            ("--plane-per-cell", self.plane_per_cell.is_some()),
+            ("--texels", self.texels.is_some()),
+            ("--build", self.build.is_some()),
+        ];
+        all.into_iter().filter_map(|(name, given)| given.then_some(name)).collect()
+    }
+
+    /// Refuses a size that was given and that tables as `choice` says cannot have.
+    pub(crate) fn check(&self, choice: &Choice) -> Result<()> {
+        match self.table {
+            Some(_) => choice.check(choice.size(0)).map_err(|e| misuse(format!("--table: {e}"))),
+            None => Ok(()),
         }
     }
 }

@@ -57,10 +57,13 @@ fn main() -> ExitCode {
         .init();
     match run(cli) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            output::error(&error);
-            ExitCode::FAILURE
-        }
+        Err(error) => match error.downcast::<clap::Error>() {
+            Ok(misuse) => misuse.exit(),
+            Err(error) => {
+                output::error(&error);
+                ExitCode::FAILURE
+            }
+        },
     }
 }
 

@@ -14,6 +14,11 @@ pub(crate) fn error(error: &anyhow::Error) {
     let _ = writeln!(std::io::stderr(), "halite: {line}");
 }
 
+/// Options that do not go together: the program exits with 2 and says so.
+pub(crate) fn misuse(what: impl std::fmt::Display) -> anyhow::Error {
+    clap::Error::raw(clap::error::ErrorKind::ArgumentConflict, format!("{what}\n")).into()
+}
+
 /// Writes `text` to stdout. A reader that has seen enough is no error.
 pub(crate) fn print(text: &str) -> Result<()> {
     match std::io::stdout().write_all(text.as_bytes()) {

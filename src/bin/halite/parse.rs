@@ -24,6 +24,12 @@ pub(crate) fn positive(text: &str) -> Result<f64, String> {
     number(text).and_then(|n| if n > 0.0 { Ok(n) } else { Err("it is above 0".into()) })
 }
 
+/// A factor above 0.
+pub(crate) fn gain(text: &str) -> Result<f32, String> {
+    let gain = positive(text)? as f32;
+    if gain > 0.0 && gain.is_finite() { Ok(gain) } else { Err(format!("{text} is beyond 32 bits")) }
+}
+
 /// Any finite number.
 pub(crate) fn finite(text: &str) -> Result<f64, String> {
     number(text)
@@ -118,6 +124,7 @@ mod tests {
         for wrong in ["640", "x", "0x4", "-1x4", "640x480x3"] {
             assert!(size(wrong).is_err(), "{wrong}");
         }
+        assert!(gain("nan").is_err() && gain("-1").is_err() && gain("1e60").is_err() && gain("0.5") == Ok(0.5));
         assert!(range("2:1").is_err() && range("nan:1").is_err() && vector("1,2").is_err());
         assert!(background("0,0,255").is_err() && plane("0,0,0,0,0,0").is_err() && positive("0").is_err());
     }

@@ -4,7 +4,7 @@ use clap::{Args, ValueEnum};
 use halite::field::{Association, Component, Field};
 use halite::gpu::DeviceChoice;
 use halite::image::{Backdrop, Image};
-use halite::integral::Choice;
+use halite::integral::choice::{Choice, Form};
 use halite::mesh::{Mesh, cells::Tetrahedra};
 use halite::project::Switches;
 use halite::render::{self, Renderer, Stats};
@@ -210,7 +210,15 @@ impl Request {
     /// A renderer on `device`, with the engine and its switches that were asked for.
     pub(crate) fn renderer(&self, threads: usize, scene: Option<&Scene>, device: DeviceChoice) -> Result<Renderer> {
         let named = scene.and_then(|s| Engine::from_str(s.engine.as_deref()?, true).ok());
-        let engine = self.engine.or(named).unwrap_or(Engine::Auto).into();
+        let engine = self.engine.or(named).unwrap_or(Engine::Auto);
+        let others = self.variant.given().join(", ");
+        if !others.is_empty() && !matches!(engine, Engine::Project) {
+            if self.engine.is_some() {
+                return Err(output::misuse(format!("the projection engine alone has {others}: --engine project")));
+            }
+            tracing::warn!("the projection engine alone has {others}, and it does not draw: --engine project");
+        }
+        let engine = engine.into();
         let mut renderer = Renderer::with_engine(threads, device, engine)?;
         let switches = scene.map_or(Ok(Switches::default()), |s| variant::of_scene(s, &self.input))?;
         renderer.set_switches(self.variant.apply(switches));
@@ -221,7 +229,37 @@ impl Request {
     /// The form of the integral that was asked for.
     pub(crate) fn choice(&self, scene: Option<&Scene>) -> Result<Choice> {
         let choice = scene.map_or(Ok(Choice::default()), |s| integral::of_scene(s, &self.input))?;
-        Ok(self.integral.apply(choice))
+        let choice = self.integral.apply(choice);
+        self.integral.check(&choice)?;
+        Ok(choice)
+    }
+
+    /// What a study of all variants takes of this: the size of tables, if it was said.
+    ///
+    /// # Errors
+    /// Options that a study has no place for, and a scene that is no study's.
+    pub(crate) fn studied(&self, scene: Option<&Scene>) -> Result<Option<[u32; 3]>> {
+        let engine = self.engine.map(|_| "--engine");
+        let given: Vec<_> = engine.into_iter().chain(self.variant.given()).chain(self.integral.given()).collect();
+        if !given.is_empty() {
+            let given = given.join(", ");
+            return Err(output::misuse(format!("study draws all variants, and leaves no choice by {given}")));
+        }
+        let choice = scene.map_or(Ok(Choice::default()), |s| integral::of_scene(s, &self.input))?;
+        let choice = self.integral.apply(choice);
+        self.integral.check(&Choice { form: Form::Volume, ..choice })?;
+        let left: Vec<_> = scene.map_or(vec![], |s| {
+            let said = [("projection", s.projection.is_some()), ("integral", s.integral.is_some())];
+            said.into_iter().filter_map(|(key, said)| said.then_some(key)).collect()
+        });
+        if !left.is_empty() {
+            let left = left.join(" and ");
+            tracing::warn!("study draws all variants, whatever the scene's {left} ask for; tables are of its size");
+        }
+        if self.blend().or(scene.map(|s| s.blend)) == Some(Blend::Maximum) {
+            bail!("a maximum along rays has no variants to compare: --blend composite draws the scene's integral");
+        }
+        Ok(choice.table)
     }
 
     fn scalars(&self, scene: Option<&Scene>, mesh: &Mesh) -> Result<Scalars> {

@@ -1,8 +1,8 @@
 mod forms;
 
 use crate::render::{self, Job, Request};
-use crate::{output, progress};
-use anyhow::{Context, Result};
+use crate::{output, parse, progress};
+use anyhow::{Context, Result, bail};
 use clap::Args;
 use embedded_graphics::mono_font::{MonoTextStyle, ascii::FONT_6X10};
 use embedded_graphics::pixelcolor::Rgb888;
@@ -33,7 +33,7 @@ pub(crate) struct Options {
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
     frames: u32,
     /// How much differences are magnified
-    #[arg(long, value_name = "GAIN", default_value_t = 10.0)]
+    #[arg(long, value_name = "GAIN", default_value_t = 10.0, value_parser = parse::gain)]
     gain: f32,
     /// Compare the forms of the integral instead, in both engines: the exact one and all tables
     #[arg(long)]
@@ -114,7 +114,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
         return forms::run(options, threads);
     }
     let given = options.request.scene()?;
-    let size = options.request.choice(given.as_ref())?.table.or(Some([256, 256, 16]));
+    let size = options.request.studied(given.as_ref())?.or(Some([256, 256, 16]));
     let device = options.request.device(given.as_ref());
     let mut judge = Renderer::with_device(threads, DeviceChoice::Cpu)?;
     let job = judge.install(|| render::prepare(&options.request, given))?;
@@ -138,6 +138,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
             }
         }
     });
+    check(&rows)?;
     let tetrahedra = renderer.stats().tetrahedra;
     output::print(&table(&rows, tetrahedra))?;
     let background = job.scene.background.unwrap_or_default().map(|c| c as f32);
@@ -161,6 +162,11 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
         std::fs::write(path, format!("{whole:#}\n")).with_context(|| path.display().to_string())?;
     }
     Ok(())
+}
+
+/// Fails where not even one variant could be drawn: each has said why.
+fn check<T>(rows: &[T]) -> Result<()> {
+    if rows.is_empty() { bail!("no variant can be drawn of this scene") } else { Ok(()) }
 }
 
 fn set(renderer: &mut Renderer, job: &Job) -> halite::Result<()> {

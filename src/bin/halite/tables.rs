@@ -38,7 +38,7 @@ pub(crate) struct Options {
     #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1..))]
     segments: u32,
     /// How much differences are magnified
-    #[arg(long, value_name = "GAIN", default_value_t = 8.0)]
+    #[arg(long, value_name = "GAIN", default_value_t = 8.0, value_parser = parse::gain)]
     gain: f32,
     /// A sheet, a row for each line: the table at four lengths, each beside its difference from the exact integral
     /// (.png)

@@ -22,9 +22,10 @@ pub(crate) struct Variant {
     /// What cells are blended into: rgba32float, rgba16float or rgba8
     #[arg(long, value_name = "FORMAT", value_parser = named::<Target>, help_heading = "Projection engine")]
     target: Option<Target>,
-    /// Round opacities at random when they are blended into rgba8
-    #[arg(long, help_heading = "Projection engine")]
-    dither: bool,
+    /// Round opacities at random when they are blended into rgba8; =false switches off what a scene asks for
+    #[arg(long, value_name = "BOOL", num_args = 0..=1, require_equals = true, default_missing_value = "true",
+        help_heading = "Projection engine")]
+    dither: Option<bool>,
     /// How a cell joins what lies behind it: over, or additive
     #[arg(long, value_name = "KIND", value_parser = named::<Compositing>, help_heading = "Projection engine")]
     compositing: Option<Compositing>,
@@ -38,9 +39,22 @@ impl Variant {
             thickness: self.thickness.unwrap_or(switches.thickness),
             order: self.order.unwrap_or(switches.order),
             target: self.target.unwrap_or(switches.target),
-            dither: self.dither || switches.dither,
+            dither: self.dither.unwrap_or(switches.dither),
             compositing: self.compositing.unwrap_or(switches.compositing),
         }
+    }
+
+    /// The names of the options that were given.
+    pub(crate) fn given(&self) -> Vec<&'static str> {
+        let all = [
+            ("--fragments", self.fragments.is_some()),
+            ("--thickness", self.thickness.is_some()),
+            ("--order", self.order.is_some()),
+            ("--target", self.target.is_some()),
+            ("--dither", self.dither.is_some()),
+            ("--compositing", self.compositing.is_some()),
+        ];
+        all.into_iter().filter_map(|(name, given)| given.then_some(name)).collect()
     }
 }
 

@@ -1,8 +1,8 @@
-#![allow(clippy::unwrap_used, reason = "tests")]
+#![allow(clippy::unwrap_used, clippy::print_stderr, reason = "tests")]
 
 use super::*;
 use crate::field::Normal;
-use crate::transfer::{Emission, TransferFunction};
+use crate::transfer::{Convention, Emission, TransferFunction};
 
 const UNIT: [Normal; 4] = [Normal { mid: 0.0, half: 1.0 }; 4];
 
@@ -134,6 +134,30 @@ fn fewer_bits_round_texels() {
         };
         let [eight, sixteen] = [Texels::Unorm8, Texels::Unorm16].map(error);
         assert!(eight > 20.0 * sixteen && sixteen > 0.0 && eight < 0.2, "{choice:?}: {eight}, {sixteen}");
+    }
+}
+
+/// What is opaque has a mean extinction beyond all bounds: it must not take the levels of what is not.
+#[test]
+fn an_opaque_stretch_leaves_levels_to_the_rest() {
+    let color = vec![(-1.0, [0.1, 0.2, 0.9]), (0.0, [0.1, 0.9, 0.6]), (1.0, [1.0, 0.1, 0.1])];
+    let opacity = vec![(-1.0, 0.0), (-0.4, 0.0), (-0.1, 0.9), (0.1, 0.1), (0.6, 1.0), (1.0, 1.0)];
+    let transfer = TransferFunction::new(color, opacity, 0.5).unwrap().with_convention(Convention::Opacity);
+    let exact = Exact::<f64>::new(&transfer, field::Kind::Scalar, &UNIT, 1.0);
+    let segments: Vec<_> = segments(20_000).into_iter().filter(|s| s[2] > 0.05).collect();
+    for form in [Form::Volume, Form::Polynomial, Form::Cylindrical] {
+        let choice = Choice { table: Some([128, 128, 16]), ..Choice::of(form) };
+        let [float, sixteen, eight] = [Texels::Float, Texels::Unorm16, Texels::Unorm8].map(|texels| {
+            let table = Lookup::new(&exact, &Choice { texels, ..choice }, 2.0).unwrap();
+            segments.iter().map(|&[f, b, l]| table.look_up(f, b, l)).collect::<Vec<_>>()
+        });
+        let rmse = |a: &[[f32; 4]]| {
+            let squares = a.iter().flatten().zip(float.iter().flatten()).map(|(a, b)| f64::from(a - b).powi(2));
+            (squares.sum::<f64>() / (4 * segments.len()) as f64).sqrt()
+        };
+        let (sixteen, eight) = (rmse(&sixteen), rmse(&eight));
+        eprintln!("{form:?}: 16 bits {sixteen:.1e}, 8 bits {eight:.1e}");
+        assert!(sixteen < 4e-3 && eight < 0.03, "{form:?}: {sixteen}, {eight}");
     }
 }
 

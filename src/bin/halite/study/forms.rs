@@ -1,6 +1,6 @@
 //! The forms of the integral in both engines: errors and times in one table.
 
-use super::{Options, Row, Variant, set, sheet};
+use super::{Options, Row, Variant, check, set, sheet};
 use crate::render::{self, Job};
 use crate::{output, progress};
 use anyhow::{Context, Result};
@@ -60,7 +60,7 @@ fn forms(interpolated: bool, table: Option<[u32; 3]>) -> Vec<(&'static str, Choi
 
 pub(super) fn run(options: &Options, threads: usize) -> Result<()> {
     let given = options.request.scene()?;
-    let size = options.request.choice(given.as_ref())?.table;
+    let size = options.request.studied(given.as_ref())?;
     let device = options.request.device(given.as_ref());
     let mut judge = Renderer::with_device(threads, DeviceChoice::Cpu)?;
     let job = judge.install(|| render::prepare(&options.request, given))?;
@@ -100,6 +100,7 @@ pub(super) fn run(options: &Options, threads: usize) -> Result<()> {
             }
         });
     }
+    check(&rows)?;
     output::print(&table(&rows))?;
     write(options, &job, &rows)?;
     let background = job.scene.background.unwrap_or_default().map(|c| c as f32);

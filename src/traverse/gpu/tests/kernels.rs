@@ -157,6 +157,37 @@ fn cells_are_walked_as_in_f64() {
     assert!(entered > 10_000);
 }
 
+/// Faces seen edge-on are nothing but what products leave when they cancel.
+#[test]
+fn areas_are_as_accurate_as_they_are_small() {
+    let Some(gpu) = gpu() else { return };
+    let mut random = Random(5);
+    let cases: Vec<[[f32; 4]; 4]> = (0..100_000)
+        .map(|_| {
+            let (line, off) = (random.direction(), 10f64.powf(random.within(-9.0, -3.0)));
+            [(); 4].map(|()| {
+                let (s, h) = (random.within(-1.0, 1.0), random.within(-off, off));
+                [(s * line.x - h * line.y) as f32, (s * line.y + h * line.x) as f32, 0.0, 0.0]
+            })
+        })
+        .collect();
+    let variant = Variant { kind: Kind::Scalar, direct: false };
+    let source = [&shader::prelude(&variant), shader::CELL, CELL_TEST].join("\n");
+    let outcomes: Vec<Outcome> = run(&gpu, &source, &[], &cases);
+    for (case, outcome) in cases.iter().zip(&outcomes) {
+        let area = |a: [f32; 4], b: [f32; 4]| {
+            let [ax, ay, bx, by] = [a[0], a[1], b[0], b[1]].map(f64::from);
+            // Both products are exact.
+            ax * by - ay * bx
+        };
+        let [a, b, c, _] = *case;
+        let want = [area(b, c), area(c, a), area(a, b)];
+        for (got, want) in outcome.areas.iter().zip(want) {
+            assert!((f64::from(*got) - want).abs() <= 1e-6 * want.abs() + 1e-15, "{got:e}, not {want:e}: {case:?}");
+        }
+    }
+}
+
 const PLACE_TEST: &str = "
 struct Case { origin: Twice, direction: Twice, point: Twice }
 struct Outcome { place: vec4f, right: vec4f, up: vec4f, sum: Twice }
