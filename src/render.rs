@@ -399,9 +399,13 @@ impl Renderer {
                     if let AnyValues::Scalar(v) = &field.values {
                         self.stats.knots_per_cell = tables::knots_in_cells(&mesh.geometry, v, exact);
                         choice = self.integral.resolved(self.stats.knots_per_cell, exact.opacity.len());
+                        if choice.check_function(exact).is_err() {
+                            choice.form = Form::Exact;
+                        }
                     }
                 }
                 lookup::check(&choice, choice.size(exact.opacity.len()), kind)?;
+                choice.check_function(exact)?;
                 let key = (choice.form != Form::Exact).then(|| {
                     let (pool, geometry) = (&self.pool, &mesh.geometry);
                     let longest = *mesh.longest.get_or_insert_with(|| pool.install(|| geometry.longest_edge()));

@@ -1,5 +1,6 @@
 //! Which form of the ray-segment integral draws.
 
+use super::Exact;
 use super::table::Kind;
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -134,6 +135,10 @@ pub enum Build {
 /// Knots that the mean cell spans, up to which [`Form::Auto`] is exact.
 pub const FEW_KNOTS: f64 = 8.0;
 
+/// Extinction, per normalised unit, up to which tables of colours over what is seen of a length hold direct emission:
+/// rounding is 1e-7 of it.
+const OPAQUE_TEXEL: f32 = 1e4;
+
 /// Bytes of a table at most.
 const MOST_BYTES: u64 = 1 << 30;
 
@@ -176,6 +181,23 @@ impl Choice {
         size.iter().fold(16, |n: u64, &s| n.saturating_mul(u64::from(s)))
     }
 
+    /// Whether such a table can hold a function.
+    ///
+    /// # Errors
+    /// [`Error::Render`] for direct emission that is nearly opaque somewhere, if the table has colours over what is seen
+    /// of a length: that is nearly nothing there, and rounding of one texel is more than all of its neighbour.
+    pub fn check_function(&self, exact: &Exact<f32>) -> Result<()> {
+        let is_normalised =
+            self.form == Form::Polynomial || self.form == Form::Volume && self.lengths == Kind::LogNormalised;
+        if !is_normalised || !exact.direct || exact.opacity.steepest() <= OPAQUE_TEXEL {
+            return Ok(());
+        }
+        let what = "this form of table cannot hold direct emission that is nearly opaque somewhere";
+        Err(Error::Render(format!(
+            "{what}; use a volume with lengths log or uniform, a cylinder, or the exact integral"
+        )))
+    }
+
     /// Whether there can be such a table.
     ///
     /// # Errors
@@ -214,6 +236,30 @@ impl Choice {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::field::{self, Normal};
+    use crate::transfer::{Emission, TransferFunction};
+
+    #[test]
+    fn opaque_direct_emission_is_refused_where_colours_are_over_what_is_seen() {
+        let exact = |emission, extinction| {
+            let transfer = TransferFunction::new(vec![(0.0, [0.5; 3])], vec![(-1.0, 0.0), (1.0, extinction)], 1.0);
+            let transfer = transfer.unwrap().with_emission(emission).unwrap();
+            Exact::new(&transfer, field::Kind::Scalar, &[Normal { mid: 0.0, half: 1.0 }; 4], 1.0)
+        };
+        let direct = Emission::Direct { scale: 1.0 };
+        for (form, lengths, refused) in [
+            (Form::Polynomial, Kind::LogNormalised, true),
+            (Form::Volume, Kind::LogNormalised, true),
+            (Form::Volume, Kind::Log, false),
+            (Form::Cylindrical, Kind::LogNormalised, false),
+            (Form::Exact, Kind::LogNormalised, false),
+        ] {
+            let choice = Choice { lengths, ..Choice::of(form) };
+            assert_eq!(choice.check_function(&exact(direct, 1e6)).is_err(), refused, "{form:?}, {lengths:?}");
+            assert!(choice.check_function(&exact(direct, 10.0)).is_ok(), "{form:?}, {lengths:?}");
+            assert!(choice.check_function(&exact(Emission::Chromatic, 1e6)).is_ok(), "{form:?}, {lengths:?}");
+        }
+    }
 
     #[test]
     fn auto_is_exact_while_knots_are_few() {
