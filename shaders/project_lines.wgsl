@@ -1,7 +1,7 @@
 // The lines of the transfer function, and the exact integral by those that a segment is on, one after the other.
 
-/// The intervals of the function that are not empty, LINES_ACROSS in a row: value, slope, and below each other the two
-/// ends and the number of the next. A texture, as drivers in software look buffers up lane by lane.
+/// The intervals of the function, LINES_ACROSS in a row: below each other value, slope, and the two ends with the number
+/// of the next that is not empty. An image, as drivers in software look buffers up lane by lane, and sample slowly.
 @group(0) @binding(10) var lines: texture_storage_2d<rgba32float, read>;
 
 /// A line of the function, between which values it is that, and the interval above; the last has itself there.

@@ -71,7 +71,8 @@ impl Lookup {
         Self::of(exact, choice, stored)
     }
 
-    /// The same, in the memory of `old` where that fits, which need not be had anew: where pages are small, that takes half of the time.
+    /// The same, in the memory of `old` where that fits, which need not be had anew: where pages are small, that takes
+    /// half of the time.
     ///
     /// # Errors
     /// As [`Self::new`].
