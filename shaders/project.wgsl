@@ -25,12 +25,10 @@ struct Frame {
     far: f32,
     /// Cells with a corner that is not this deep are special, in perspective views.
     nearest: f32,
-    /// 1 in perspective views, 0 in parallel ones.
-    perspective: u32,
     planes: u32,
-    unused: u32,
     /// From one pixel to the next, in units of x and y.
     pixel: vec2f,
+    unused: vec2f,
 }
 
 @group(0) @binding(3) var<uniform> frame: Frame;
@@ -44,7 +42,7 @@ fn seen(p: vec3f) -> vec3f {
     let depth = fma(p.x, frame.forward.x, fma(p.y, frame.forward.y, fma(p.z, frame.forward.z, frame.forward.w)));
     let x = fma(p.x, frame.across[0].x, fma(p.y, frame.across[0].y, p.z * frame.across[0].z));
     let y = fma(p.x, frame.across[1].x, fma(p.y, frame.across[1].y, p.z * frame.across[1].z));
-    return vec3f(x, y, select(1.0, depth, frame.perspective == 1u));
+    return vec3f(x, y, select(1.0, depth, PERSPECTIVE));
 }
 
 /// Where in the image, in [−1, 1] from its middle to its edges, the pixel with the centre `at` has its sample.

@@ -11,10 +11,10 @@ struct Part {
 }
 
 @group(2) @binding(0) var<uniform> part: Part;
-/// The number of parts of the values' range, of FILLED equal ones, below each in which the function is not empty.
-@group(2) @binding(1) var<storage, read> filled: array<u32>;
+/// For each end of the BINS equal bins of the values' range: in how many below it something may be seen, and its line.
+@group(2) @binding(1) var<storage, read> bins: array<vec2u>;
 @group(2) @binding(2) var<storage, read_write> keys: array<u32>;
-/// Cells from back to front. What is drawn of them starts at the third: the first two are those before.
+/// Cells from back to front, and, from PIECE on, how many parts of the cell came before.
 @group(2) @binding(3) var<storage, read> order: array<u32>;
 @group(2) @binding(4) var<storage, read_write> records: array<Record>;
 
@@ -55,12 +55,35 @@ fn values_of(cell: u32, corners: vec4u) -> array<Value, 4> {
     return array<Value, 4>(v, v, v, v);
 }
 
-/// Whether the function may show something of values between two.
-fn shows(low: f32, high: f32) -> bool {
-    // One part more on both sides than needed: rounding.
-    let first = clamp(i32((low + 1.0) * (f32(FILLED) / 2.0)) - 1, 0, i32(FILLED) - 1);
-    let last = clamp(i32((high + 1.0) * (f32(FILLED) / 2.0)) + 1, 0, i32(FILLED) - 1);
-    return filled[last + 1] > filled[first];
+/// The end of a bin below `s`, one further than needed: rounding.
+fn end_below(s: f32) -> i32 {
+    return clamp(i32((s + 1.0) * (f32(BINS) / 2.0)) - 1, 0, i32(BINS) - 1);
+}
+
+/// In how many parts a cell is drawn whose values are between two; 0 if the function shows nothing of it.
+fn parts_of(low: f32, high: f32) -> u32 {
+    let below = bins[end_below(low)];
+    let above = bins[min(end_below(high) + 3, i32(BINS))];
+    var parts = 1u;
+    if LINES > 0u && FORM == INTERSECTED {
+        parts = min((above.y - below.y) / max(LINES, 1u) + 1u, MOST_PARTS);
+    }
+    return select(0u, parts, above.x > below.x);
+}
+
+/// The line of the least of a cell's values.
+fn line_at(low: f32, high: f32) -> u32 {
+    var i = bins[end_below(low)].y;
+    var ends = ends_of(i);
+    loop {
+        // No value is above 1, but this ends whatever is one.
+        if ends.y > min(low, 2.0) {
+            break;
+        }
+        i++;
+        ends = ends_of(i);
+    }
+    return select(i, u32(ends.z), low == high && low == ends.x && ends.z != 0.0);
 }
 
 /// The centre of the sphere through the corners, from the first of them; not finite for flat cells.
@@ -79,7 +102,8 @@ fn key_of(cell: u32) -> u32 {
         return HIDDEN;
     }
     let s = vec4f(last_of(v[0]), last_of(v[1]), last_of(v[2]), last_of(v[3]));
-    if !shows(min(min(s.x, s.y), min(s.z, s.w)), max(max(s.x, s.y), max(s.z, s.w))) {
+    var parts = parts_of(min(min(s.x, s.y), min(s.z, s.w)), max(max(s.x, s.y), max(s.z, s.w)));
+    if parts == 0u {
         return HIDDEN;
     }
     let p = solid_of(corners).p;
@@ -127,13 +151,16 @@ fn key_of(cell: u32) -> u32 {
         }
     }
     var depth = dot(middle, frame.forward.xyz);
-    if frame.perspective == 1u {
+    if PERSPECTIVE {
         depth = (dot(middle, middle) - radius + 2.0 * frame.forward.w * depth) / max(2.0 * frame.forward.w, 1.0);
     }
     let bits = bitcast<u32>(depth);
     let ascending = select(bits | 0x80000000u, ~bits, (bits >> 31u) == 1u);
+    if is_near && FORM != INTERSECTED {
+        parts = 3u;
+    }
     // No finite depth gives HIDDEN.
-    return (~ascending & ~IN_PARTS) | select(0u, IN_PARTS, is_near && FORM != INTERSECTED);
+    return (~ascending & ~(MOST_PARTS - 1u)) | (parts - 1u);
 }
 
 @compute @workgroup_size(64)
@@ -150,17 +177,10 @@ fn project_all(@builtin(global_invocation_id) id: vec3u) {
     if i >= part.count {
         return;
     }
-    let at = part.first + i;
-    let cell = order[at];
-    var piece = 0u;
-    if FORM != INTERSECTED {
-        // A cell that is drawn in parts comes once for each.
-        if order[at - 1u] == cell {
-            piece = select(1u, 2u, order[at - 2u] == cell);
-        }
-    }
+    let entry = order[part.first + i];
+    let cell = entry & ((1u << PIECE) - 1u);
     let corners = cells(cell);
-    write_record(i, solid_of(corners), values_of(cell, corners), piece, part.rank + i);
+    write_record(i, solid_of(corners), values_of(cell, corners), entry >> PIECE, part.rank + i);
 }
 
 /// How the four directions from the eye to the corners depend on each other: Σ a p = 0, the sum of a being six volumes.
@@ -171,9 +191,9 @@ fn dependency(p: array<vec3f, 4>) -> vec4f {
     let c = p[2] - p[0];
     let d = p[3] - p[0];
     let normals = array<vec3f, 3>(cross(c, d), cross(d, b), cross(b, c));
-    let from_eye = select(frame.direction[0].xyz, p[0] + frame.direction[0].xyz * frame.forward.w, frame.perspective == 1u);
+    let from_eye = select(frame.direction[0].xyz, p[0] + frame.direction[0].xyz * frame.forward.w, PERSPECTIVE);
     let rest = -vec3f(dot(from_eye, normals[0]), dot(from_eye, normals[1]), dot(from_eye, normals[2]));
-    let volume = select(0.0, dot(b, normals[0]), frame.perspective == 1u);
+    let volume = select(0.0, dot(b, normals[0]), PERSPECTIVE);
     return vec4f(volume - rest.x - rest.y - rest.z, rest);
 }
 

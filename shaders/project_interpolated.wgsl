@@ -7,7 +7,7 @@
 // has the values on the front and on the back (for INTERPOLATED, over w), 1/w (depth in a parallel view) of both, how
 // much they differ, and how long the ray's way is. The words of a record:
 // 0    the middle of a pixel at the thickest point, and the depths between which rays are seen (t in a parallel view);
-// 1–2  the stretch of rays around it; the longest edge, and 1 in perspective views;
+// 1–2  the stretch of rays around it; and the longest edge;
 // 3    the rank, and which plane of a cylindrical table holds the thickest point;
 // then the lines of the function.
 // The values: the least and the greatest.
@@ -20,7 +20,7 @@ fn pixel_of(p: vec3f) -> vec2f {
 /// 1/w, or depth in a parallel view.
 fn reach_of(p: vec3f) -> f32 {
     let along = dot(p, frame.forward.xyz);
-    return select(along, 1.0 / (along + frame.forward.w), frame.perspective == 1u);
+    return select(along, 1.0 / (along + frame.forward.w), PERSPECTIVE);
 }
 
 /// A piece of a cell, its corners and values; false if it is none.
@@ -38,7 +38,7 @@ fn write_nothing(i: u32) {
 }
 
 fn write_vertex(i: u32, k: u32, corner: vec2f, front: Value, back: Value, depths: vec4f) {
-    let is_over_w = FORM == INTERPOLATED && frame.perspective == 1u;
+    let is_over_w = FORM == INTERPOLATED && PERSPECTIVE;
     records[i].vertices[k].corner = corner;
     records[i].vertices[k].front = front * select(1.0, depths.x, is_over_w);
     records[i].vertices[k].back = back * select(1.0, depths.y, is_over_w);
@@ -125,7 +125,7 @@ fn write_record(i: u32, whole: Solid, values: array<Value, 4>, piece: u32, rank:
     let corners = whole.p;
     var p = corners;
     var v = values;
-    if frame.perspective == 1u {
+    if PERSPECTIVE {
         let left = cut(p, v, piece);
         if !left.exists {
             write_nothing(i);
@@ -160,7 +160,7 @@ fn write_record(i: u32, whole: Solid, values: array<Value, 4>, piece: u32, rank:
     let front_depth = reach_of(front);
     let back_depth = reach_of(back);
     let deeper = abs(dot(apart, frame.forward.xyz));
-    let difference = select(deeper, deeper * front_depth * back_depth, frame.perspective == 1u);
+    let difference = select(deeper, deeper * front_depth * back_depth, PERSPECTIVE);
     let inside = seen(front + (back - front) * 0.5);
     let low = min(min(v[0], v[1]), min(v[2], v[3]));
     let high = max(max(v[0], v[1]), max(v[2], v[3]));
@@ -183,7 +183,7 @@ fn write_record(i: u32, whole: Solid, values: array<Value, 4>, piece: u32, rank:
     let stretch = stretch_around(centre, 1.0);
     words[0] = vec4f(centre, vec2f(frame.near, frame.far) + frame.forward.w);
     words[1] = vec4f(stretch[0], longest);
-    words[2] = vec4f(stretch[1], f32(frame.perspective));
+    words[2] = vec4f(stretch[1], 0.0);
     words[3] = vec4f(f32(rank & 0xffffffu), plane, 0.0, 0.0);
-    store(i, words, last_of(low), last_of(high), Values(low, high));
+    store(i, words, vec4f(), last_of(low), last_of(high), 0.0, 0u, Values(low, high));
 }

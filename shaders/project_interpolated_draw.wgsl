@@ -7,13 +7,12 @@ fn fragment(drawn: Drawn) -> @location(0) vec4f {
     cell_plane = words[3].y;
     let at = drawn.at.xy;
     let stretch = stretch_of(words[1].xyz, words[2].xyz, at - words[0].xy);
-    let is_perspective = words[2].w != 0.0;
     let depths = drawn.depths;
     var front = drawn.front;
     var back = drawn.back;
     var deeper = depths.z;
     var depth = depths.x;
-    if is_perspective {
+    if PERSPECTIVE {
         deeper = depths.z / (depths.x * depths.y);
         depth = 1.0 / depths.x;
         if FORM == INTERPOLATED {
@@ -43,5 +42,7 @@ fn fragment(drawn: Drawn) -> @location(0) vec4f {
     let rise = back - front;
     back = select(front + rise * (end / length), back, end == length);
     front = select(front + rise * (start / length), front, start == 0.0);
-    return quantised(colored(front, back, end - start, values[0], words), at, u32(words[3].x));
+    // Lines count values from the cell's least.
+    let least = select(Value(), values[0], COLORING == EXACT && LINES > 0u);
+    return quantised(colored(front - least, back - least, end - start, words), at, u32(words[3].x));
 }

@@ -2,12 +2,12 @@
 
 // The words of a record:
 // 0–2  the cell's facets, counted from the middle of a pixel amid it;
-// 3    that middle, and the nearnesses between which rays are seen;
-// 4–5  the stretch of rays around it, times the cell's depth; the longest edge, and 1 in perspective views;
-// 6    which facets are entered, the rank, and the cell's depth (t in a parallel view);
-// then the lines of the function.
+// 3    that middle, how far it is from the least value to the greatest, and which facets are entered;
+// 4–5  the stretch of rays around it, times the cell's depth; and the longest edge;
+// then, where anything cuts rays off or is dithered, the nearnesses between which they are seen, the cell's depth (t in a
+// parallel view) and the rank; and the lines of the function.
 // The values: in the middle; how it rises from pixel to pixel to the right and down, and towards the eye; the least and
-// the greatest.
+// the greatest. If they are COUNTED, from the least.
 
 /// To pixels from the upper left corner of the image.
 fn pixel_of(p: vec3f) -> vec2f {
@@ -133,13 +133,13 @@ fn write_record(i: u32, solid: Solid, v: array<Value, 4>, piece: u32, rank: u32)
     // Where the pixel's ray is as deep as the cell's middle, how far that is from one pixel to the next, and from the
     // eye.
     var t = dot(centroid, frame.forward.xyz);
-    if frame.perspective == 1u {
+    if PERSPECTIVE {
         // Around the eye, as far as the cell goes: nearnesses of what is much farther cancel.
         t = max(t, max(frame.nearest, 0.5 * longest) - frame.forward.w);
     }
     // Few digits, so that products with it are exact.
     t = shortened(vec3f(t)).x;
-    let depth = select(1.0, t + frame.forward.w, frame.perspective == 1u);
+    let depth = select(1.0, t + frame.forward.w, PERSPECTIVE);
     let along = direction_at(xy);
     let right = fma(frame.direction[1].xyz, vec3f(t), frame.origin[0].xyz) * frame.pixel.x;
     let down = fma(frame.direction[2].xyz, vec3f(t), frame.origin[1].xyz) * frame.pixel.y;
@@ -150,7 +150,7 @@ fn write_record(i: u32, solid: Solid, v: array<Value, 4>, piece: u32, rank: u32)
     let volume = dot(solid.b, n[1]);
     var heights = vec4f(dot(away - solid.b, n[0]), dot(away, n[1]), dot(away, n[2]), dot(away, n[3]));
     var slopes = vec4f(dot(out, n[0]), dot(out, n[1]), dot(out, n[2]), dot(out, n[3]));
-    if frame.perspective == 1u {
+    if PERSPECTIVE {
         slopes -= heights;
     }
     let across = vec4f(dot(right, n[0]), dot(right, n[1]), dot(right, n[2]), dot(right, n[3]));
@@ -159,7 +159,7 @@ fn write_record(i: u32, solid: Solid, v: array<Value, 4>, piece: u32, rank: u32)
     let edge_on = abs(slopes) <= EDGE_ON * size;
     heights = select(heights, heights + (ASIDE.x * across + ASIDE.y * along_rows), edge_on);
     slopes = select(slopes, vec4f(FLAT), edge_on);
-    var words: array<vec4f, 7>;
+    var words: array<vec4f, 6>;
     words[0] = heights / slopes;
     words[1] = across / slopes;
     words[2] = along_rows / slopes;
@@ -168,23 +168,27 @@ fn write_record(i: u32, solid: Solid, v: array<Value, 4>, piece: u32, rank: u32)
     if !(abs(volume) > FLAT) {
         around = array<vec2f, 4>(vec2f(-9.0), vec2f(-9.0), vec2f(-9.0), vec2f(-9.0));
     }
-    var limits = vec2f(t - frame.near, t - frame.far);
-    if frame.perspective == 1u {
-        limits = depth / max(vec2f(frame.near, frame.far) + frame.forward.w, vec2f(AT_EYE)) - 1.0;
-    }
-    words[3] = vec4f(centre, limits);
     let rises = array<Value, 3>((v[1] - v[0]) / volume, (v[2] - v[0]) / volume, (v[3] - v[0]) / volume);
     let low = min(min(v[0], v[1]), min(v[2], v[3]));
     let high = max(max(v[0], v[1]), max(v[2], v[3]));
+    words[3] = vec4f(centre, last_of(high) - last_of(low), f32(bits.x | bits.y | bits.z | bits.w));
     let stretch = stretch_around(centre, depth);
     words[4] = vec4f(stretch[0], longest);
-    words[5] = vec4f(stretch[1], f32(frame.perspective));
-    words[6] = vec4f(f32(bits.x | bits.y | bits.z | bits.w), f32(rank & 0xffffffu), select(t, depth, frame.perspective == 1u), 0.0);
-    store(i, words, last_of(low), last_of(high), Values(
-        v[0] + (rises[0] * dot(away, n[1]) + rises[1] * dot(away, n[2]) + rises[2] * dot(away, n[3])),
+    words[5] = vec4f(stretch[1], 0.0);
+    var limits = vec2f(t - frame.near, t - frame.far);
+    if PERSPECTIVE {
+        limits = depth / max(vec2f(frame.near, frame.far) + frame.forward.w, vec2f(AT_EYE)) - 1.0;
+    }
+    let rare = vec4f(limits, select(t, depth, PERSPECTIVE), f32(rank & 0xffffffu));
+    let middle = (v[0] - select(Value(), low, COUNTED)) + (rises[0] * dot(away, n[1]) + rises[1] * dot(away, n[2]) + rises[2] * dot(away, n[3]));
+    let towards_eye = -(rises[0] * dot(out, n[1]) + rises[1] * dot(out, n[2]) + rises[2] * dot(out, n[3]));
+    // In a parallel view the eye is beyond all values.
+    let eye = select(FAR * last_of(towards_eye), last_of(low) + last_of(middle + towards_eye), PERSPECTIVE);
+    store(i, words, rare, last_of(low), last_of(high), eye, piece, Values(
+        middle,
         rises[0] * dot(right, n[1]) + rises[1] * dot(right, n[2]) + rises[2] * dot(right, n[3]),
         rises[0] * dot(down, n[1]) + rises[1] * dot(down, n[2]) + rises[2] * dot(down, n[3]),
-        -(rises[0] * dot(out, n[1]) + rises[1] * dot(out, n[2]) + rises[2] * dot(out, n[3])),
+        towards_eye,
         low,
         high,
     ));

@@ -1,27 +1,24 @@
 // The lines of the transfer function, and the exact integral by those that a segment is on, one after the other.
 
-/// The intervals of the function, LINES_ACROSS in a row: below each other value, slope, and the two ends with the number
-/// of the next that is not empty. An image, as drivers in software look buffers up lane by lane, and sample slowly.
+/// The lines of the function, LINES_ACROSS in a row: below each other value, slope, and the two ends with the number of the
+/// line of a single value. An image, as drivers in software look buffers up lane by lane, and sample slowly.
 @group(0) @binding(10) var lines: texture_storage_2d<rgba32float, read>;
 
-/// A line of the function, between which values it is that, and the interval above; the last has itself there.
+/// A line of the function, and between which values it is that.
 struct Line {
     value: vec4f,
     slope: vec4f,
     ends: vec2f,
-    next: u32,
 }
 
-/// The interval of the function that begins at the knot `i`.
 fn line_of(i: u32) -> Line {
     let at = vec2u(i % LINES_ACROSS, 3u * (i / LINES_ACROSS));
-    let ends = textureLoad(lines, at + vec2u(0u, 2u));
-    return Line(textureLoad(lines, at), textureLoad(lines, at + vec2u(0u, 1u)), ends.xy, u32(ends.z));
+    return Line(textureLoad(lines, at), textureLoad(lines, at + vec2u(0u, 1u)), ends_of(i).xy);
 }
 
-/// The interval that a constant `s` is in.
-fn interval_of(s: f32) -> u32 {
-    return track(function.opacity, select(function.end, function.color, PAIR), 0u, s, s).i;
+/// The ends of a line, and the number of the line of its least value as a single one, if that is another; else 0.
+fn ends_of(i: u32) -> vec4f {
+    return textureLoad(lines, vec2u(i % LINES_ACROSS, 3u * (i / LINES_ACROSS) + 2u));
 }
 
 /// A segment from its lesser value to its greater, whichever is in front. Places along it are shares of it, from 0 to 1.
@@ -52,8 +49,8 @@ fn joined(ramp: Ramp, one: vec4f, other: vec4f) -> vec4f {
 }
 
 /// Premultiplied colour and opacity of a segment, by lines that are looked up one by one; the lesser value is in the
-/// interval `first` or above it.
-fn by_intervals(front: Value, back: Value, length: f32, first: u32) -> vec4f {
+/// line `first` or above it.
+fn by_lookups(front: Value, back: Value, length: f32, first: u32) -> vec4f {
     let ramp = ramp_of(last_of(front), last_of(back), length);
     let rises = ramp.sign > 0.0;
     let high = ramp.low + ramp.range;
@@ -62,7 +59,7 @@ fn by_intervals(front: Value, back: Value, length: f32, first: u32) -> vec4f {
     var u = 0.0;
     loop {
         let line = line_of(i);
-        let is_last = high < line.ends.y || line.next == i;
+        let is_last = high < line.ends.y;
         let next = select(clamp((line.ends.y - ramp.low) * ramp.share, u, 1.0), 1.0, is_last);
         let a = line.value + line.slope * (clamp(ramp.low + ramp.range * u, line.ends.x, line.ends.y) - line.ends.x);
         let b = line.value + line.slope * (clamp(ramp.low + ramp.range * next, line.ends.x, line.ends.y) - line.ends.x);
@@ -80,7 +77,7 @@ fn by_intervals(front: Value, back: Value, length: f32, first: u32) -> vec4f {
         if is_last || work > most_work() {
             break;
         }
-        i = line.next;
+        i++;
         u = next;
     }
     return vec4f(sum.xyz, 1.0 - sum.w);

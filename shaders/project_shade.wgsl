@@ -12,11 +12,11 @@ fn most_work() -> u32 {
     return MOST_WORK;
 }
 
-/// Premultiplied colour and opacity of a segment of a cell whose least value is `least`.
-fn colored(front: Value, back: Value, length: f32, least: Value, words: Words) -> vec4f {
+/// Premultiplied colour and opacity of a segment of a cell; with LINES, values count from its least.
+fn colored(front: Value, back: Value, length: f32, words: Words) -> vec4f {
     work = 0u;
     if COLORING == EXACT {
-        return integrated(front, back, length, least, words);
+        return integrated(front, back, length, words);
     }
     return tabulated(last_of(front), last_of(back), length);
 }

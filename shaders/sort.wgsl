@@ -8,12 +8,7 @@ struct Pass {
     blocks: u32,
     /// Whether numbers are the items' own places.
     is_first: u32,
-    /// Where the numbers of this pass start.
-    start: u32,
-    /// And where they go.
-    start_next: u32,
     row: u32,
-    unused: u32,
 }
 
 const ITEMS = 256u;
@@ -146,9 +141,9 @@ fn scatter(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index)
             next_keys[to] = key;
             var number = i;
             if digits.is_first == 0u {
-                number = numbers[digits.start + i];
+                number = numbers[i];
             }
-            next_numbers[digits.start_next + to] = number;
+            next_numbers[to] = number;
         }
         workgroupBarrier();
         if takes_part {

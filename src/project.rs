@@ -30,6 +30,13 @@ pub struct Switches {
     pub compositing: Compositing,
 }
 
+impl Switches {
+    /// Whether anything is rounded at random.
+    pub(crate) fn dithers(&self) -> bool {
+        self.dither && self.target == Target::Rgba8
+    }
+}
+
 /// Where the values and lengths of a fragment come from.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -96,8 +103,8 @@ pub enum Compositing {
 /// What a frame took.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Counts {
-    /// Cells and parts of cells that were drawn.
-    pub(crate) records: u64,
+    /// Cells that were drawn.
+    pub(crate) cells: u64,
     /// Finding the cells that are seen and sorting them; 0 where the order was known.
     pub(crate) order_ms: f64,
     /// By the device's own clock, where it has one, or in software the host's: projecting all cells of the order, and

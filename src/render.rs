@@ -450,9 +450,9 @@ impl Renderer {
             let _ = progress(1.0);
             self.stats.uploaded_bytes = project.gpu().uploaded() - uploaded;
             self.stats.device_bytes = project.gpu().allocated();
-            let project::Counts { records, order_ms, project_ms, draw_ms, fragments } = counts;
+            let project::Counts { cells, order_ms, project_ms, draw_ms, fragments } = counts;
             self.stats.projection =
-                Some(ProjectionStats { drawn_cells: records, order_ms, project_ms, draw_ms, fragments });
+                Some(ProjectionStats { drawn_cells: cells, order_ms, project_ms, draw_ms, fragments });
             self.stats.device_ms = project_ms.zip(draw_ms).map(|(p, d)| p + d);
             self.stats.frame_ms = ms(start);
             self.build_next(late)?;

@@ -25,10 +25,7 @@ struct Pass {
     shift: u32,
     blocks: u32,
     is_first: u32,
-    start: u32,
-    start_next: u32,
     row: u32,
-    unused: u32,
 }
 
 /// The sort, compiled.
@@ -53,22 +50,22 @@ impl Sorter {
     }
 
     /// Whether `items` keys are few enough for the device's bindings.
-    pub(crate) fn fits(gpu: &Gpu, items: usize, start: usize) -> bool {
+    pub(crate) fn fits(gpu: &Gpu, items: usize) -> bool {
         let limits = gpu.device.limits();
         let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        4 * (items + start) as u64 <= most
+        4 * items as u64 <= most
     }
 
     /// The numbers of the items of `keys`, which is as long as `items` and is overwritten, by ascending key; equal ones
-    /// in sequence. They begin at place `start` of the buffer; how many they are comes with it.
+    /// in sequence. How many they are comes with it.
     ///
     /// # Errors
     /// Those of [`Gpu::wait`] and [`Buffer::new`].
-    pub(crate) fn sort(&self, gpu: &Gpu, keys: &Buffer, items: usize, start: usize) -> Result<(Buffer, usize)> {
+    pub(crate) fn sort(&self, gpu: &Gpu, keys: &Buffer, items: usize) -> Result<(Buffer, usize)> {
         let blocks = items.div_ceil(BLOCK).max(1) as u32;
         let bytes = 4 * items as u64;
         let other_keys = Buffer::new(gpu, "keys", bytes, Usage::STORAGE)?;
-        let numbers = Buffer::new(gpu, "order", bytes + 4 * start as u64, Usage::STORAGE | Usage::COPY_SRC)?;
+        let numbers = Buffer::new(gpu, "order", bytes, Usage::STORAGE | Usage::COPY_SRC)?;
         let other_numbers = Buffer::new(gpu, "numbers", bytes, Usage::STORAGE)?;
         let counts = Buffer::new(gpu, "counts", 64 * u64::from(blocks), Usage::STORAGE)?;
         let total = Buffer::new(gpu, "total", 4, Usage::STORAGE | Usage::COPY_SRC)?;
@@ -77,17 +74,7 @@ impl Sorter {
         // An even number of passes: what the first writes to is the other pair, the last writes the order.
         let passes = (0..PASSES)
             .map(|p| {
-                let (from, to) = if p % 2 == 0 { (start as u32, 0) } else { (0, start as u32) };
-                let pass = Pass {
-                    items: items as u32,
-                    shift: 4 * p,
-                    blocks,
-                    is_first: u32::from(p == 0),
-                    start: from,
-                    start_next: to,
-                    row,
-                    unused: 0,
-                };
+                let pass = Pass { items: items as u32, shift: 4 * p, blocks, is_first: u32::from(p == 0), row };
                 Buffer::holding(gpu, "pass", &[pass], Usage::UNIFORM)
             })
             .collect::<Result<Vec<_>>>()?;

@@ -19,6 +19,16 @@ pub struct Knots<R> {
     pub(crate) bucket: Vec<u32>,
 }
 
+/// A line of the function, between which values it is that, and, where a constant that is opaque as a single value is the
+/// least of them, the number of the line of that; else 0.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Line<R> {
+    pub(crate) value: [R; 4],
+    pub(crate) slope: [R; 4],
+    pub(crate) ends: [R; 2],
+    pub(crate) single: usize,
+}
+
 /// Number of entries of the look-up that finds the interval of a scalar.
 pub(crate) const BUCKETS: usize = 512;
 
@@ -71,6 +81,21 @@ impl<R: Real> Knots<R> {
         self.value[i][k] + self.slope[i][k] * (s - self.s[i])
     }
 
+    /// The lines, ascending, and after them those of constants that are opaque as single values.
+    pub(crate) fn lines(&self) -> Vec<Line<R>> {
+        let line = |i: usize, ends: [R; 2]| Line { value: self.value[i], slope: self.slope[i], ends, single: 0 };
+        let intervals: Vec<usize> = (1..self.s.len()).filter(|&i| self.s[i - 1] < self.s[i]).map(|i| i - 1).collect();
+        let mut lines: Vec<_> = intervals.iter().map(|&i| line(i, [self.s[i], self.s[i + 1]])).collect();
+        for (k, &i) in intervals.iter().enumerate() {
+            let single = self.of_constant(i, self.s[i]);
+            if single != i {
+                lines[k].single = lines.len();
+                lines.push(line(single, [self.s[i], R::of(FAR)]));
+            }
+        }
+        lines
+    }
+
     /// The most lines that values which differ by up to `width` can be on.
     pub(crate) fn lines_within(&self, width: R) -> usize {
         let begins: Vec<R> = self.s.windows(2).filter(|k| k[0] < k[1]).map(|k| k[0]).collect();
@@ -93,6 +118,17 @@ impl<R: Real> Knots<R> {
         let positive = |v: &[R; 4]| v[..channels].iter().any(|&c| c > R::of(0.0));
         // Linear in between: from the knot below to the one above.
         self.value[first..(beyond + 1).min(self.value.len())].iter().any(positive)
+    }
+
+    /// The interval that says what a constant `s` in the interval `i` is: if it is opaque as a single value, it is opaque all
+    /// along.
+    #[inline(always)]
+    fn of_constant(&self, mut i: usize, s: R) -> usize {
+        let opaque = |k: &[R; 4]| k[0] >= R::of(OPAQUE_EXTINCTION);
+        while i > 0 && self.s[i - 1] == s && opaque(&self.value[i - 1]) && !opaque(&self.value[i]) {
+            i -= 1;
+        }
+        i
     }
 
     /// The interval that `s` lies in: the last whose lower end is not above it.
@@ -124,11 +160,7 @@ impl<'a, R: Real> Track<'a, R> {
     pub(super) fn new(knots: &'a Knots<R>, front: R, back: R) -> Self {
         let (mut i, rise) = (knots.interval(front), back - front);
         if rise == R::of(0.0) {
-            // A constant that is opaque as a single value is opaque all along.
-            let opaque = |k: &[R; 4]| k[0] >= R::of(OPAQUE_EXTINCTION);
-            while i > 0 && knots.s[i - 1] == front && opaque(&knots.value[i - 1]) && !opaque(&knots.value[i]) {
-                i -= 1;
-            }
+            i = knots.of_constant(i, front);
         }
         Track { knots, i, front, rise }
     }

@@ -9,11 +9,8 @@ use rayon::prelude::*;
 /// The key of a cell that is not drawn.
 pub const HIDDEN: u32 = u32::MAX;
 
-/// Set in the keys of cells that are drawn in [`PARTS`] parts.
-pub const IN_PARTS: u32 = 1;
-
-/// Parts that such a cell is drawn in.
-pub const PARTS: usize = 3;
+/// Parts that a cell is drawn in at most, a power of two: the last bits of its key are one less than its number of parts.
+pub const MOST_PARTS: u32 = 4;
 
 /// Bits of a key that one pass sorts by.
 const BITS: u32 = 11;
@@ -27,7 +24,7 @@ type Item = (u32, u32);
 
 /// The order that `keys` say, one for each cell; without `sort`, that in which the cells are stored.
 pub fn order(keys: &[u32], sort: bool) -> VisibilityOrder {
-    let parts = |key: u32| if key == HIDDEN { 0 } else { [1, PARTS][(key & IN_PARTS) as usize] };
+    let parts = |key: u32| if key == HIDDEN { 0 } else { (key % MOST_PARTS) as usize + 1 };
     let items: Vec<Item> = keys
         .par_iter()
         .with_min_len(LEAST)
@@ -95,7 +92,7 @@ mod tests {
     fn expected(keys: &[u32]) -> Vec<u32> {
         let mut items: Vec<Item> = keys.iter().copied().zip(0..).filter(|i| i.0 != HIDDEN).collect();
         items.sort_by_key(|i| i.0);
-        items.iter().flat_map(|&(key, cell)| vec![cell; if key & IN_PARTS == 1 { PARTS } else { 1 }]).collect()
+        items.iter().flat_map(|&(key, cell)| vec![cell; (key % MOST_PARTS) as usize + 1]).collect()
     }
 
     proptest! {

@@ -1,9 +1,7 @@
 //! What a frame's shaders need to know of a view and a transfer function.
 
-use crate::field::Kind;
 use crate::geometry::Geometry;
 use crate::gpu::arrays;
-use crate::integral::{Exact, Knots};
 use crate::view::{Fan, View};
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat3, DVec3};
@@ -18,9 +16,6 @@ const NEAR_EYE: f64 = 2.0;
 /// Cells that reach nearer to the plane through the eye of a perspective view than this, in normalised units, are
 /// special.
 const NEAREST: f64 = 1e-4;
-
-/// Equal parts of the values' range, for each of which it is known whether the function is empty there.
-pub(super) const FILLED: usize = 1024;
 
 /// `Frame` in the shaders.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
@@ -39,15 +34,15 @@ pub(super) struct Frame {
     near: f32,
     far: f32,
     nearest: f32,
-    perspective: u32,
     planes: u32,
-    unused: u32,
     pixel: [f32; 2],
+    unused: [f32; 2],
 }
 
 /// A view as the shaders see it.
 pub(super) struct Seen {
     pub(super) frame: Frame,
+    pub(super) perspective: bool,
     pub(super) planes: Vec<[f32; 4]>,
     /// Where a depth buffer ends each pixel's ray; empty without one.
     pub(super) ends: Vec<f32>,
@@ -58,13 +53,33 @@ pub(super) struct Seen {
 pub(super) struct Limits {
     pub(super) ends: bool,
     pub(super) planes: bool,
+    /// By a clipping range.
+    pub(super) range: bool,
+    /// Whether rays meet at the eye.
+    pub(super) perspective: bool,
     /// One pair of a table's planes serves all fragments of a cell.
     pub(super) plane_per_cell: bool,
 }
 
+impl Limits {
+    /// Whether anything ends rays.
+    pub(super) fn any(&self) -> bool {
+        self.ends || self.planes || self.range
+    }
+}
+
 impl Seen {
     pub(super) fn limits(&self) -> Limits {
-        Limits { ends: !self.ends.is_empty(), planes: !self.planes.is_empty(), plane_per_cell: false }
+        let frame = &self.frame;
+        // In perspective views the eye is a limit anyway.
+        let near = if self.perspective { -frame.forward[3] } else { -FAR };
+        Limits {
+            ends: !self.ends.is_empty(),
+            planes: !self.planes.is_empty(),
+            range: frame.near > near || frame.far < FAR,
+            perspective: self.perspective,
+            plane_per_cell: false,
+        }
     }
 
     pub(super) fn new(geometry: &Geometry, view: &View) -> Self {
@@ -100,12 +115,11 @@ impl Seen {
             near: limit(fan.near),
             far: limit(fan.far),
             nearest: if perspective { (fan.near + fan.ahead).max(NEAREST) as f32 } else { 0.0 },
-            perspective: u32::from(perspective),
             planes: planes.len() as u32,
-            unused: 0,
+            unused: [0.0; 2],
             pixel: [2.0 / view.size()[0] as f32, -2.0 / view.size()[1] as f32],
         };
-        Seen { frame, planes, ends }
+        Seen { frame, perspective, planes, ends }
     }
 }
 
@@ -122,20 +136,4 @@ fn ends(view: &View, fan: &Fan, scale: f64) -> Vec<f32> {
         ((ray.t_max * scale - start) as f32).clamp(-FAR, FAR)
     };
     pixels.into_par_iter().map(end).collect()
-}
-
-/// For each of [`FILLED`] + 1 places that part the range of the last component, [−1, 1], equally: the number of parts
-/// below it in which something may be seen.
-pub(super) fn filled(exact: &Exact<f32>) -> Vec<u32> {
-    // Where emission is not bound to extinction, another component may shine.
-    let shines = exact.direct && exact.kind != Kind::Scalar;
-    let counts = |knots: &Knots<f32>, k: f64| {
-        let at = |b: f64| (2.0 * b / FILLED as f64 - 1.0) as f32;
-        shines || knots.shows(at(k), at(k + 1.0), exact.direct)
-    };
-    let mut sum = vec![0; FILLED + 1];
-    for k in 0..FILLED {
-        sum[k + 1] = sum[k] + u32::from(counts(&exact.opacity, k as f64));
-    }
-    sum
 }

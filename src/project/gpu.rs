@@ -8,8 +8,8 @@ mod drawing;
 mod ordering;
 mod program;
 
-use super::frame::{Seen, filled};
-use super::lines::{Extent, Lines};
+use super::frame::Seen;
+use super::lines::{self, Extent, Lines};
 use super::record::Layout;
 use super::{Counts, Fragments, Switches, Target};
 use crate::error::{Error, Result};
@@ -32,9 +32,6 @@ use wgpu::{BufferUsages as Usage, ShaderStages as Stages};
 /// Records of one batch.
 const BATCH: usize = 1 << 17;
 
-/// Entries before each buffer of the order that it repeats.
-const REPEATED: usize = 2;
-
 /// Invocations of a compute group, and groups along one axis at most.
 const GROUP: u32 = 64;
 const MOST_GROUPS: u32 = 65_535;
@@ -53,8 +50,7 @@ struct Slice {
 struct HeldFunction {
     buffers: [Buffer; 3],
     lines: Texture,
-    /// See [`filled`].
-    filled: Buffer,
+    bins: Buffer,
 }
 
 /// A device, and what of the mesh, field and function it holds.
@@ -180,8 +176,8 @@ impl Project {
             Some(function) => function,
             None => HeldFunction {
                 buffers: function::upload(gpu, exact)?,
-                lines: function::lines(gpu, exact)?,
-                filled: Buffer::holding(gpu, "filled", &filled(exact), Usage::STORAGE)?,
+                lines: lines::image(gpu, exact)?,
+                bins: lines::bins(gpu, exact)?,
             },
         };
         self.table.prepare(gpu, table, &self.function.insert(function).buffers)
@@ -208,11 +204,18 @@ impl Project {
         let format = self.format(switches.target)?;
         self.upload(geometry, values)?;
         self.prepare_table(exact, table)?;
-        let extent = self.extent.get_or_insert_with(|| Extent::new(geometry, values));
-        let layout = layout(&self.gpu.device.limits(), switches.fragments, exact, table.is_some(), *extent);
+        let extent = *self.extent.get_or_insert_with(|| Extent::new(geometry, values));
         let association = arrays::association(values);
         let arrays = self.arrays()?;
         let seen = Seen::new(geometry, view);
+        let is_rare = switches.fragments == Fragments::Intersected && (switches.dithers() || seen.limits().any());
+        let lines = match table {
+            Some(_) => Lines::None,
+            // Devices that sort draw cells in one part; they do not mind look-ups.
+            None if self.sorts => Lines::looked_up(exact.kind),
+            None => Lines::new(exact, extent, switches.fragments == Fragments::Intersected),
+        };
+        let layout = Layout::new(switches.fragments, exact.kind.components(), lines, is_rare);
         let variant = Variant { kind: exact.kind, direct: exact.direct };
         let mut limits = seen.limits();
         // In parallel views all segments of a cell are on one plane.
@@ -223,10 +226,10 @@ impl Project {
         self.compile(&arrays, source, switches, layout, format)?;
         let frame = Pass::new(self, &seen)?;
         let mut counts = Counts::default();
-        if !self.ordered.as_ref().is_some_and(|o| o.holds_for(&seen, switches)) {
+        if !self.ordered.as_ref().is_some_and(|o| o.holds_for(&seen, switches, lines)) {
             let start = Instant::now();
             self.ordered = None;
-            self.ordered = Some(self.order(&frame, &seen, geometry.cells.len(), switches)?);
+            self.ordered = Some(self.order(&frame, &seen, geometry.cells.len(), switches, lines)?);
             counts.order_ms = start.elapsed().as_secs_f64() * 1e3;
         }
         self.draw(&frame, view, &mut counts).map(|pixels| (pixels, counts))
@@ -274,7 +277,7 @@ impl Project {
         records: wgpu::BindingResource,
     ) -> wgpu::BindGroup {
         let [keys, order] = [keys, order].map(|b| b.raw.as_entire_binding());
-        raster::group(&self.gpu, &self.own, [slice, frame.filled.as_entire_binding(), keys, order, records])
+        raster::group(&self.gpu, &self.own, [slice, frame.bins.as_entire_binding(), keys, order, records])
     }
 }
 
@@ -282,14 +285,14 @@ impl Project {
 struct Pass {
     shared: wgpu::BindGroup,
     arrays: wgpu::BindGroup,
-    filled: wgpu::Buffer,
+    bins: wgpu::Buffer,
     _buffers: [Buffer; 3],
 }
 
 impl Pass {
     fn new(project: &Project, seen: &Seen) -> Result<Self> {
         let gpu = &project.gpu;
-        let (Some(HeldFunction { buffers: function, lines, filled }), Some(program), Some(table)) =
+        let (Some(HeldFunction { buffers: function, lines, bins }), Some(program), Some(table)) =
             (&project.function, project.programs.first(), project.table.get())
         else {
             return Err(unprepared());
@@ -305,21 +308,9 @@ impl Pass {
         Ok(Pass {
             shared: raster::group(gpu, &project.shared, shared),
             arrays: raster::group(gpu, &program.arrays, arrays),
-            filled: filled.raw.clone(),
+            bins: bins.raw.clone(),
             _buffers: buffers,
         })
-    }
-}
-
-/// Records for a function and cells of this extent, with as many lines as the device can hand to fragments.
-fn layout(limits: &wgpu::Limits, form: Fragments, exact: &Exact<f32>, by_table: bool, extent: Extent) -> Layout {
-    let components = exact.kind.components();
-    let without = Layout::new(form, components, Lines::None);
-    let most = limits.max_vertex_attributes.min(limits.max_inter_stage_shader_variables) as usize;
-    let room = most.saturating_sub(without.attributes().iter().flatten().count());
-    match by_table {
-        true => without,
-        false => Layout::new(form, components, Lines::new(exact, extent, room)),
     }
 }
 

@@ -1,12 +1,17 @@
 //! What of the transfer function comes with the record of a cell.
 //!
-//! A look-up of the function is dear in software, and so is a loop over the intervals that a segment crosses. Most
-//! functions have few of them within a cell, and most cells are thin: then a record holds the lines of all of them, and
-//! fragments go through these straight.
+//! A look-up of the function is dear in software, and so is a loop over the lines that a segment is on. Most cells have no
+//! more than two of them, and are thin: then a record holds these, and fragments go through them straight. Cells of more
+//! lines are drawn in parts, each between two of the values where lines meet.
 
+use crate::error::Result;
 use crate::field::Kind;
 use crate::geometry::{Geometry, Values};
-use crate::integral::Exact;
+use crate::gpu::Gpu;
+use crate::gpu::buffers::Buffer;
+use crate::gpu::raster::Texture;
+use crate::integral::{Exact, Knots};
+use crate::order::depth::MOST_PARTS;
 use rayon::prelude::*;
 
 const STRAIGHT: &str = include_str!("../../shaders/project_straight.wgsl");
@@ -15,16 +20,22 @@ const STRAIGHT: &str = include_str!("../../shaders/project_straight.wgsl");
 const DEEPEST: f64 = 64.0;
 
 /// The most lines that a record holds.
-const MOST: usize = 4;
+const MOST: usize = 3;
+
+/// Lines in a row of the image of them.
+pub(super) const LINES_ACROSS: usize = 4096;
+
+/// Equal bins of the values' range, [−1, 1].
+pub(super) const BINS: usize = 1024;
 
 /// What of the function comes with a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Lines {
     /// Nothing: fragments look up a table, or functions of several components.
     None,
-    /// The interval of the least value: fragments look up its line and those above one by one.
+    /// The number of the least value's line: fragments look that up and those above one by one.
     First,
-    /// All lines that a cell's values may be on, so many at most.
+    /// So many lines, one to three. Cells may be drawn in parts; values are counted from the least.
     All(usize),
 }
 
@@ -33,41 +44,50 @@ pub(crate) enum Lines {
 pub(super) struct Extent {
     /// The longest edge, in normalised units.
     edge: f64,
-    /// The greatest difference between two values of the last component in a cell.
+    /// The greatest difference between two values of the last component in a cell, and the mean.
     values: f32,
+    mean: f32,
 }
 
 impl Extent {
     pub(super) fn new<const N: usize>(geometry: &Geometry, values: &Values<N>) -> Self {
         let between = |v: [f32; 4]| v.into_iter().fold(f32::MIN, f32::max) - v.into_iter().fold(f32::MAX, f32::min);
-        let greatest = match values {
-            Values::Cell(_) => 0.0,
-            Values::Point(v) => {
-                let cells = geometry.cells.par_iter().map(|c| between(c.corners.map(|p| v[p as usize][N - 1])));
-                // Cells with a value that is not finite are not drawn.
-                cells.filter(|d| d.is_finite()).reduce(|| 0.0, f32::max)
-            }
-            Values::Corner(v) => {
-                let cells = v.par_iter().map(|v| between(v.map(|v| v[N - 1])));
-                cells.filter(|d| d.is_finite()).reduce(|| 0.0, f32::max)
-            }
+        let extent = |cells: &(dyn Fn(usize) -> [f32; 4] + Sync), n: usize| {
+            // Cells with a value that is not finite are not drawn.
+            let all = (0..n).into_par_iter().map(|i| between(cells(i))).filter(|d| d.is_finite());
+            all.map(|d| (d, f64::from(d), 1.0)).reduce(|| (0.0, 0.0, 0.0), |a, b| (a.0.max(b.0), a.1 + b.1, a.2 + b.2))
         };
-        Extent { edge: geometry.longest_edge(), values: greatest }
+        let (greatest, sum, count) = match values {
+            Values::Cell(_) => (0.0, 0.0, 0.0),
+            Values::Point(v) => {
+                let at = |i: usize| geometry.cells[i].corners.map(|p| v[p as usize][N - 1]);
+                extent(&at, geometry.cells.len())
+            }
+            Values::Corner(v) => extent(&|i: usize| v[i].map(|v| v[N - 1]), v.len()),
+        };
+        Extent { edge: geometry.longest_edge(), values: greatest, mean: (sum / f64::max(count, 1.0)) as f32 }
     }
 }
 
 impl Lines {
-    /// What suits a function and cells of this extent, with `words` of four floats at most.
-    pub(super) fn new(exact: &Exact<f32>, extent: Extent, words: usize) -> Self {
-        match exact.kind {
-            Kind::Pair => return Lines::None,
-            Kind::Rgba => return Lines::First,
-            Kind::Scalar => {}
+    /// For look-ups by fragments.
+    pub(super) fn looked_up(kind: Kind) -> Self {
+        if kind == Kind::Pair { Lines::None } else { Lines::First }
+    }
+
+    /// What suits a function and cells of this extent. Cells can be drawn in parts if `in_parts`.
+    pub(super) fn new(exact: &Exact<f32>, extent: Extent, in_parts: bool) -> Self {
+        if exact.kind != Kind::Scalar {
+            return Lines::looked_up(exact.kind);
         }
-        let (lines, steepest) = (exact.opacity.lines_within(extent.values), exact.opacity.steepest());
-        let all = Lines::All(lines);
-        let is_mild = f64::from(steepest) * extent.edge <= DEEPEST;
-        if is_mild && lines <= MOST && all.words() <= words { all } else { Lines::First }
+        // Shaders count the lines of bins, with one bin more on both sides.
+        let within = |values: f32| exact.opacity.lines_within(values + 5.0 * (2.0 / BINS as f32));
+        let is_mild = f64::from(exact.opacity.steepest()) * extent.edge <= DEEPEST;
+        let most = if in_parts { MOST * MOST_PARTS as usize } else { MOST };
+        match within(extent.values) {
+            lines if is_mild && lines <= most && within(extent.mean) <= MOST => Lines::All(lines.min(MOST)),
+            _ => Lines::looked_up(exact.kind),
+        }
     }
 
     /// The words that they take in a record.
@@ -79,97 +99,81 @@ impl Lines {
         }
     }
 
-    /// `lines_between`, which finds the words for cells whose values go from one to another, and `integrated`, the exact
-    /// integral of a segment by them, the first being words[at].
-    pub(super) fn wgsl(self, at: usize) -> String {
-        let integrated = "fn integrated(front: Value, back: Value, length: f32, least: Value, words: Words) -> vec4f";
-        let lines = match self {
+    pub(super) fn are_all(self) -> bool {
+        matches!(self, Lines::All(_))
+    }
+
+    /// `lines_between`, which finds the words for a part of a cell, and `integrated`, the exact integral of a segment by
+    /// them, the first being words[at].
+    pub(super) fn wgsl(self, at: usize, rare: bool) -> String {
+        let (lines, find, integral) = match self {
             Lines::None => {
-                return format!(
-                    "{integrated} {{
-                        light = vec4f(0.0, 0.0, 0.0, 1.0);
-                        add_segment(front, back, length);
-                        return vec4f(light.xyz, 1.0 - light.w);
-                    }}"
-                );
+                let integral = "light = vec4f(0.0, 0.0, 0.0, 1.0);
+                    add_segment(front, back, length);
+                    return vec4f(light.xyz, 1.0 - light.w);";
+                (0, String::new(), integral)
             }
             Lines::First => {
-                return format!(
-                    "fn lines_between(low: f32, high: f32) -> array<vec4f, 1> {{
-                        return array<vec4f, 1>(vec4f(f32(interval_of(low)), 0.0, 0.0, 0.0));
-                    }}
-                    {integrated} {{ return by_intervals(front, back, length, u32(words[{at}].x)); }}"
-                );
+                let find = "fn lines_between(low: f32, high: f32, eye: f32, piece: u32) -> array<vec4f, 1> {
+                    return array<vec4f, 1>(vec4f(f32(line_at(low, high)), 0.0, 0.0, 0.0));
+                }";
+                (0, find.into(), "return by_lookups(front, back, length, u32(words[LINES_AT].x));")
             }
-            Lines::All(n) => n,
+            Lines::All(n) => (n, STRAIGHT.into(), "return by_lines(last_of(front), last_of(back), length, words);"),
         };
-        // Where lines begin but for the first.
-        let kinks = ["x", "y", "z"];
-        let above = |k: usize| {
-            format!(
-                "begin.{} = line.ends.y;
-                line = line_of(line.next);
-                words[{}] = line.value;
-                words[{}] = line.slope;
-                steepest = max(steepest, extinction_between(line, low, high));
-                ",
-                kinks[k - 1],
-                2 * k,
-                2 * k + 1
-            )
-        };
-        let through = |k: usize| {
-            let [value, slope] = [at + 2 * k, at + 2 * k + 1];
-            let (begin, start, a) = match k.checked_sub(1).map(|k| kinks[k]) {
-                None => ("least".into(), "start".into(), "low - least".into()),
-                Some(c) => (format!("begin.{c}"), format!("at.{c}"), format!("max(low - begin.{c}, 0.0)")),
-            };
-            let (end, b) = match kinks.get(k).filter(|_| k + 1 < lines) {
-                None => ("end".into(), "high".into()),
-                Some(c) => (format!("at.{c}"), format!("min(high, begin.{c})")),
-            };
-            let part = format!("on_line(ramp, {start}, {end}, words[{value}], words[{slope}], {a}, {b} - {begin})");
-            match k {
-                0 => format!("var sum = {part};\n"),
-                _ => format!("sum = joined(ramp, sum, {part});\n"),
-            }
-        };
-        let last = self.words() - 1;
-        [
-            format!(
-                "const LAST_LINE_WORD = {}u;
-                fn lines_between(low: f32, high: f32) -> array<vec4f, {}> {{
-                var words: array<vec4f, {}>;
-                var line = line_of(interval_of(low));
-                words[0] = line.value + line.slope * (low - line.ends.x);
-                words[1] = line.slope;
-                var steepest = extinction_between(line, low, high);
-                var begin = vec3f(FAR);
-                ",
-                at + last,
-                last + 1,
-                last + 1
-            ),
-            (1..lines).map(above).collect(),
-            format!(
-                "words[{last}] = vec4f(begin, steepest);
-                return words;
-                }}
-                fn through_lines(ramp: Ramp, start: f32, end: f32, least: f32, words: Words) -> vec4f {{
-                let begin = words[LAST_LINE_WORD].xyz;
-                let at = clamp((begin - ramp.low) * ramp.share, vec3f(start), vec3f(end));
-                let low = fma(ramp.range, start, ramp.low);
-                let high = fma(ramp.range, end, ramp.low);
-                "
-            ),
-            (0..lines).map(through).collect(),
-            format!(
-                "return sum;
-                }}
-                {integrated} {{ return by_lines(last_of(front), last_of(back), length, last_of(least), words); }}
-                {STRAIGHT}"
-            ),
-        ]
-        .concat()
+        format!(
+            "const LINES = {lines}u;
+            const LINES_AT = {at}u;
+            const STEEPEST_AT = {}u;
+            {find}
+            fn integrated(front: Value, back: Value, length: f32, words: Words) -> vec4f {{
+                {integral}
+            }}",
+            at - 1 - usize::from(rare)
+        )
     }
+}
+
+/// The lines as an image: value, slope, and below each other the two ends and the number of the line of a single value,
+/// [`LINES_ACROSS`] in a row.
+///
+/// # Errors
+/// Those of [`Texture::new`].
+pub(super) fn image(gpu: &Gpu, exact: &Exact<f32>) -> Result<Texture> {
+    let lines = exact.opacity.lines();
+    let across = lines.len().clamp(1, LINES_ACROSS);
+    let size = [across as u32, 3 * lines.len().div_ceil(across).max(1) as u32];
+    let mut texels = vec![[0.0; 4]; size[0] as usize * size[1] as usize];
+    for (i, line) in lines.iter().enumerate() {
+        let at = i % across + 3 * across * (i / across);
+        texels[at] = line.value;
+        texels[at + across] = line.slope;
+        texels[at + 2 * across] = [line.ends[0], line.ends[1], line.single as f32, 0.0];
+    }
+    let format = wgpu::TextureFormat::Rgba32Float;
+    let usage = wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::COPY_DST;
+    let texture = Texture::new(gpu, "lines", wgpu::TextureDimension::D2, [size[0], size[1], 1], format, usage)?;
+    texture.write(gpu, [0; 3], size, bytemuck::cast_slice(&texels));
+    Ok(texture)
+}
+
+/// For each of the [`BINS`] + 1 ends of bins: the number of bins below it in which something may be seen, and the line
+/// that it is on.
+///
+/// # Errors
+/// Those of [`Buffer::new`].
+pub(super) fn bins(gpu: &Gpu, exact: &Exact<f32>) -> Result<Buffer> {
+    // Where emission is not bound to extinction, another component may shine.
+    let shines = exact.direct && exact.kind != Kind::Scalar;
+    let begins: Vec<f32> = exact.opacity.lines().iter().filter(|l| l.ends[0] < l.ends[1]).map(|l| l.ends[0]).collect();
+    let at = |b: usize| (2.0 * b as f64 / BINS as f64 - 1.0) as f32;
+    let shows = |knots: &Knots<f32>, b: usize| shines || knots.shows(at(b), at(b + 1), exact.direct);
+    let mut below = vec![[0u32; 2]; BINS + 1];
+    for b in 0..=BINS {
+        below[b][1] = begins.partition_point(|&s| s <= at(b)).max(1) as u32 - 1;
+        if b > 0 {
+            below[b][0] = below[b - 1][0] + u32::from(shows(&exact.opacity, b - 1));
+        }
+    }
+    Buffer::holding(gpu, "bins", &below, wgpu::BufferUsages::STORAGE)
 }

@@ -10,8 +10,12 @@ use super::Fragments;
 use super::lines::Lines;
 
 /// The words of a form before its lines, and how many values there are.
-const INTERSECTED: (usize, usize) = (7, 6);
+const INTERSECTED: (usize, usize) = (6, 6);
 const INTERPOLATED: (usize, usize) = (4, 2);
+
+/// Values of an intersected cell, but for the least and the greatest: where records hold lines, values count from the
+/// least, and the words tell how far to the greatest.
+const COUNTED: usize = 4;
 
 /// A float, two or four.
 fn type_of(floats: usize) -> &'static str {
@@ -35,20 +39,25 @@ pub(crate) struct Layout {
     /// The first word with lines, the first with values, and the number of values.
     lines_at: usize,
     values: (usize, usize),
+    /// Whether the last word before the lines is one that few pictures need.
+    rare: bool,
 }
 
 impl Layout {
-    pub(crate) fn new(form: Fragments, components: usize, lines: Lines) -> Self {
+    /// With one word more that few pictures need if `rare`.
+    pub(crate) fn new(form: Fragments, components: usize, lines: Lines, rare: bool) -> Self {
         let is_intersected = form == Fragments::Intersected;
         let own = match is_intersected {
             true => vec![("corner", 2)],
             false => vec![("corner", 2), ("front", components), ("back", components), ("depths", 4)],
         };
-        let (triangles, (lines_at, count)): (&[u32], _) = match is_intersected {
+        let (triangles, (words, count)): (&[u32], _) = match is_intersected {
             true => (&[0, 1, 2, 0, 2, 3], INTERSECTED),
             false => (&[0, 1, 2, 0, 2, 3, 0, 3, 4, 0, 4, 1], INTERPOLATED),
         };
         let parts = triangles.iter().fold(0, |n, &i| n.max(i + 1));
+        let lines_at = words + usize::from(rare);
+        let count = if is_intersected && lines.are_all() { COUNTED } else { count };
         let values = (lines_at + lines.words(), count);
         let words = values.0 + (count * components).div_ceil(4);
         let mut end = 0;
@@ -61,7 +70,7 @@ impl Layout {
         let own: Vec<_> = own.into_iter().map(place).collect();
         let share = words.div_ceil(parts as usize);
         let words_at = end.next_multiple_of(16);
-        Layout { triangles, parts, own, words, share, words_at, components, lines, lines_at, values }
+        Layout { triangles, parts, own, words, share, words_at, components, lines, lines_at, values, rare }
     }
 
     /// Bytes of a part, and of a record.
@@ -96,8 +105,8 @@ impl Layout {
         parts
     }
 
-    /// `Record` and `store`, which fills its words, with the function between two values; `Stored`, which is what a vertex finds of it, and `Drawn`, which it
-    /// hands on to fragments; and what fragments take out of that again.
+    /// `Record` and `store`, which fills its words, with the function between two values; `Stored`, which is what a vertex
+    /// finds of it, and `Drawn`, which it hands on to fragments; and what fragments take out of that again.
     pub(crate) fn wgsl(&self) -> String {
         let Layout { parts, words, share, lines_at, values: (first, count), components, .. } = *self;
         let own = |each: &dyn Fn(usize, &str) -> String, skipped: usize| {
@@ -107,6 +116,8 @@ impl Layout {
         let each = |of: &dyn Fn(usize) -> String| (0..words).map(of).collect::<String>();
         let at = self.own.len();
 
+        let usual = lines_at - usize::from(self.rare);
+
         // Values are packed tightly into words.
         let float = |i: usize| format!("[{}].{}", i / 4, ["x", "y", "z", "w"][i % 4]);
         let packed = |i: usize| match i {
@@ -115,7 +126,10 @@ impl Layout {
             _ => format!("v[{}].{}", i / components, ["x", "y", "z", "w"][i % components]),
         };
         let word = |i: usize| match i.checked_sub(first) {
+            None if i >= lines_at && self.lines.are_all() => format!("lines.words[{}]", i - lines_at),
             None if i >= lines_at => format!("lines[{}]", i - lines_at),
+            None if i >= usual => "rare".into(),
+            None if i + 1 == usual && self.lines.are_all() => format!("vec4f(words[{i}].xyz, lines.steepest)"),
             None => format!("words[{i}]"),
             Some(k) => format!("vec4f({})", (4 * k..4 * k + 4).map(packed).collect::<Vec<_>>().join(", ")),
         };
@@ -124,17 +138,26 @@ impl Layout {
             let floats: Vec<_> = floats.map(|f| format!("words{}", float(4 * first + f))).collect();
             format!("Value({})", floats.join(", "))
         };
-        let values: Vec<_> = (0..count).map(value).collect();
-        let lines = if self.lines == Lines::None { "" } else { "let lines = lines_between(low, high); " };
+        let mut values: Vec<_> = (0..count).map(value).collect();
+        let counts = count == COUNTED;
+        if counts {
+            values.extend(["0.0".into(), "words[3].z".into()]);
+        }
+        let lines = match self.lines {
+            Lines::None => "",
+            _ => "let lines = lines_between(low, high, eye, piece); ",
+        };
 
         [
-            self.lines.wgsl(lines_at),
+            self.lines.wgsl(lines_at, self.rare),
             format!("alias Words = array<vec4f, {words}>;"),
-            format!("alias Values = array<Value, {count}>;"),
+            format!("alias Values = array<Value, {}>;", values.len()),
+            format!("const COUNTED = {counts};"),
             format!("struct Vertex {{ {}words: array<vec4f, {share}> }}", own(&|_, field| field.into(), 0)),
             format!("struct Record {{ vertices: array<Vertex, {parts}> }}"),
             format!(
-                "fn store(i: u32, words: array<vec4f, {lines_at}>, low: f32, high: f32, v: Values) {{ {lines}{}}}",
+                "fn store(i: u32, words: array<vec4f, {usual}>, rare: vec4f, low: f32, high: f32, eye: f32, piece: u32, v: Values)
+                {{ {lines}{}}}",
                 each(&|w| format!("records[i].vertices[{}].words[{}] = {}; ", w / share, w % share, word(w)))
             ),
             format!(
@@ -155,6 +178,10 @@ impl Layout {
             format!(
                 "fn words_of(drawn: Drawn) -> Words {{ return Words({}); }}",
                 each(&|w| format!("drawn.word_{w}, "))
+            ),
+            format!(
+                "fn rare_in(words: Words) -> vec4f {{ return {}; }}",
+                if self.rare { format!("words[{usual}]") } else { "vec4f()".into() }
             ),
             format!("fn values_in(words: Words) -> Values {{ return Values({}); }}", values.join(", ")),
             String::new(),

@@ -1,6 +1,6 @@
 //! Projecting and drawing the batches of a frame.
 
-use super::{BATCH, Pass, Project, REPEATED, Slice, groups_of, unprepared};
+use super::{BATCH, Pass, Project, Slice, groups_of, unprepared};
 use crate::error::Result;
 use crate::gpu::buffers::Buffer;
 use crate::gpu::clock::{CLOCKS, Clock};
@@ -68,14 +68,14 @@ impl Project {
             return Err(unprepared());
         };
         let format = canvas.format;
-        counts.records = ordered.entries as u64;
+        counts.cells = ordered.cells as u64;
         // Each batch's slice at its own offset, as uniforms are aligned.
         let step = gpu.device.limits().min_uniform_buffer_offset_alignment.max(size_of::<Slice>() as u32) as usize;
         let firsts: Vec<usize> = (0..ordered.entries).step_by(BATCH).collect();
         let mut slices = vec![0u8; step * firsts.len().max(1)];
         for (i, &first) in firsts.iter().enumerate() {
             let count = (ordered.entries - first).min(BATCH);
-            let within = first % ordered.chunk + REPEATED;
+            let within = first % ordered.chunk;
             let slice =
                 Slice { first: within as u32, count: count as u32, row: groups_of(count).0, rank: first as u32 };
             slices[step * i..][..size_of::<Slice>()].copy_from_slice(bytemuck::bytes_of(&slice));

@@ -1,17 +1,21 @@
 //! Which cells are seen, and in which order they are drawn.
 
-use super::{BATCH, Pass, Project, REPEATED, Slice, groups_of, unprepared};
+use super::{BATCH, Pass, Project, Slice, groups_of, unprepared};
 use crate::error::Result;
 use crate::gpu::buffers::Buffer;
 use crate::gpu::raster::Readback;
 use crate::gpu::sort::Sorter;
 use crate::order::depth::{self, HIDDEN};
 use crate::project::frame::{Frame, Seen};
+use crate::project::lines::Lines;
 use crate::project::{Fragments, Order, Switches};
 use wgpu::BufferUsages as Usage;
 
 /// Entries of one buffer of the order, a multiple of [`BATCH`].
 pub(super) const ORDER_CHUNK: usize = BATCH << 6;
+
+/// The bit of an entry from which on it says how many parts of the cell came before; those below it are the cell.
+pub(super) const PIECE: u32 = 30;
 
 /// Cells that are classified at once.
 const CLASSIFIED: usize = 1 << 24;
@@ -19,67 +23,99 @@ const CLASSIFIED: usize = 1 << 24;
 /// Somebody who is shown keys, some at a time.
 type Reader<'a> = &'a mut dyn FnMut(&[u32]);
 
+/// Which cells are drawn in parts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Parts {
+    /// None.
+    None,
+    /// Those of more lines of the function than a record holds.
+    OfLines,
+    /// Those around the eye.
+    AroundEye,
+}
+
+impl Parts {
+    fn new(switches: &Switches, lines: Lines) -> Self {
+        match switches.fragments {
+            Fragments::Intersected if lines.are_all() => Parts::OfLines,
+            Fragments::Intersected => Parts::None,
+            _ => Parts::AroundEye,
+        }
+    }
+}
+
 /// The order of a frame, and what it holds for.
 pub(super) struct Ordered {
     frame: Frame,
     planes: Vec<[f32; 4]>,
     by: Order,
-    form: Fragments,
-    /// Entries, and the buffers that they are in, so many in each.
+    parts: Parts,
+    /// Cells, and entries: one for each part of a cell; and the buffers that they are in, so many in each.
+    pub(super) cells: usize,
     pub(super) entries: usize,
     pub(super) chunk: usize,
     pub(super) chunks: Vec<Buffer>,
 }
 
 impl Ordered {
-    pub(super) fn holds_for(&self, seen: &Seen, switches: &Switches) -> bool {
-        let parts = |form| form != Fragments::Intersected;
+    pub(super) fn holds_for(&self, seen: &Seen, switches: &Switches, lines: Lines) -> bool {
         self.frame == seen.frame
             && self.planes == seen.planes
             && self.by == switches.order
-            && parts(self.form) == parts(switches.fragments)
+            && self.parts == Parts::new(switches, lines)
     }
+}
+
+/// Writes into the entries of each cell, which come one after another, how many came before, and counts cells.
+fn number_parts(order: &mut [u32]) -> usize {
+    let (mut last, mut part, mut cells) = (None, 0, 0);
+    for entry in order {
+        part = if last == Some(*entry) { part + 1 } else { 0 };
+        cells += usize::from(part == 0);
+        last = Some(*entry);
+        *entry |= part << PIECE;
+    }
+    cells
 }
 
 impl Project {
     /// Finds the cells that are seen, and sorts them.
-    pub(super) fn order(&mut self, frame: &Pass, seen: &Seen, cells: usize, switches: &Switches) -> Result<Ordered> {
-        let ordered = |entries, chunk, chunks| Ordered {
+    pub(super) fn order(
+        &mut self,
+        frame: &Pass,
+        seen: &Seen,
+        cells: usize,
+        switches: &Switches,
+        lines: Lines,
+    ) -> Result<Ordered> {
+        let parts = Parts::new(switches, lines);
+        let ordered = |cells, entries, chunk, chunks| Ordered {
             frame: seen.frame,
             planes: seen.planes.clone(),
             by: switches.order,
-            form: switches.fragments,
+            parts,
+            cells,
             entries,
             chunk,
             chunks,
         };
         // Cells in parts are sorted on the host, which can make several entries of one.
-        let whole = switches.fragments == Fragments::Intersected && switches.order != Order::None;
-        if self.sorts && whole && Sorter::fits(&self.gpu, cells, REPEATED) {
+        if self.sorts && parts == Parts::None && switches.order != Order::None && Sorter::fits(&self.gpu, cells) {
             if self.sorter.is_none() {
                 self.sorter = Some(Sorter::new(&self.gpu, HIDDEN)?);
             }
             let keys = self.classify(frame, cells, None)?;
             let sorter = self.sorter.as_ref().ok_or_else(unprepared)?;
-            let (order, entries) = sorter.sort(&self.gpu, &keys, cells, REPEATED)?;
-            return Ok(ordered(entries, usize::MAX, vec![order]));
+            let (order, entries) = sorter.sort(&self.gpu, &keys, cells)?;
+            return Ok(ordered(entries, entries, usize::MAX, vec![order]));
         }
         let mut all: Vec<u32> = Vec::with_capacity(cells);
         self.classify(frame, cells, Some(&mut |keys: &[u32]| all.extend_from_slice(keys)))?;
-        let order = depth::order(&all, switches.order != Order::None).cells;
+        let mut order = depth::order(&all, switches.order != Order::None).cells;
         drop(all);
-        let chunks = (0..order.len())
-            .step_by(ORDER_CHUNK)
-            .map(|first| {
-                let end = (first + ORDER_CHUNK).min(order.len());
-                if first == 0 {
-                    let own = [&[HIDDEN; REPEATED][..], &order[..end]].concat();
-                    return Buffer::holding(&self.gpu, "order", &own, Usage::STORAGE);
-                }
-                Buffer::holding(&self.gpu, "order", &order[first - REPEATED..end], Usage::STORAGE)
-            })
-            .collect::<Result<_>>()?;
-        Ok(ordered(order.len(), ORDER_CHUNK, chunks))
+        let cells = number_parts(&mut order);
+        let chunks = order.chunks(ORDER_CHUNK).map(|part| Buffer::holding(&self.gpu, "order", part, Usage::STORAGE));
+        Ok(ordered(cells, order.len(), ORDER_CHUNK, chunks.collect::<Result<_>>()?))
     }
 
     /// The keys of all cells. If somebody wants to read them, they are shown some at a time, and only the last are

@@ -1,17 +1,18 @@
 //! What the programs are compiled from, and for.
 
 use super::Project;
+use super::ordering::PIECE;
 use crate::error::Result;
 use crate::gpu::arrays;
-use crate::gpu::function::LINES_ACROSS;
 use crate::gpu::raster::{self, Slot};
 use crate::gpu::shader::{self, Array, Variant};
 use crate::gpu::table::{self, TABLE};
 use crate::integral::Lookup;
-use crate::order::depth::{HIDDEN, IN_PARTS};
-use crate::project::frame::{FAR, FILLED, Limits};
+use crate::order::depth::{HIDDEN, MOST_PARTS};
+use crate::project::frame::{FAR, Limits};
+use crate::project::lines::{BINS, LINES_ACROSS};
 use crate::project::record::Layout;
-use crate::project::{Compositing, Fragments, Order, Switches, Target, Thickness};
+use crate::project::{Compositing, Fragments, Order, Switches, Thickness};
 use wgpu::ShaderStages as Stages;
 
 const SHARED: &str = include_str!("../../../shaders/project.wgsl");
@@ -128,16 +129,18 @@ pub(super) fn program(
     };
     for (name, value) in [
         ("BY_DEPTH", switches.thickness == Thickness::Depth),
-        ("DITHERED", switches.dither && switches.target == Target::Rgba8),
+        ("DITHERED", switches.dithers()),
         ("ADDITIVE", switches.compositing == Compositing::Additive),
         ("HAS_ENDS", limits.ends),
         ("HAS_PLANES", limits.planes),
+        ("IS_CLIPPED", limits.range),
+        ("PERSPECTIVE", limits.perspective),
         ("BY_SPHERE", switches.order == Order::Circumsphere),
     ] {
         text += &format!("const {name} = {value};\n");
     }
     text += &format!(
-        "const LINES_ACROSS = {LINES_ACROSS}u;\nconst HIDDEN = {HIDDEN}u;\nconst IN_PARTS = {IN_PARTS}u;\nconst FILLED = {FILLED}u;\nconst MOST_WORK = {MOST_WORK}u;\n\
+        "const LINES_ACROSS = {LINES_ACROSS}u;\nconst HIDDEN = {HIDDEN}u;\nconst MOST_PARTS = {MOST_PARTS}u;\nconst BINS = {BINS}u;\nconst PIECE = {PIECE}u;\nconst MOST_WORK = {MOST_WORK}u;\n\
          const INTERSECTED = 0u;\nconst INTERPOLATED = 1u;\nconst LINEAR = 2u;\nconst FORM = {form};\n\
          const POINT = 0u;\nconst CORNER = 1u;\nconst CELL = 2u;\nconst ASSOCIATION = {association};\n"
     );

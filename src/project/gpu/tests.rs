@@ -7,7 +7,7 @@ use crate::gpu::raster::Readback;
 use crate::gpu::testing::{gpu, validated};
 use crate::integral::lookup::tests::{choices, exact};
 use crate::mesh::{cells::Tetrahedra, generate};
-use crate::order::depth::{self, HIDDEN, IN_PARTS};
+use crate::order::depth::{self, HIDDEN, MOST_PARTS};
 use crate::project::Compositing;
 use crate::project::frame::{Frame, Limits};
 use crate::render::{Engine, Renderer};
@@ -27,7 +27,7 @@ const FORMS: [Fragments; 3] = [Fragments::Intersected, Fragments::Interpolated, 
 /// The lines that records for such fields may have, unless there is a table.
 fn lines(kind: Kind) -> Vec<Lines> {
     match kind {
-        Kind::Scalar => [Lines::First].into_iter().chain((1..=4).map(Lines::All)).collect(),
+        Kind::Scalar => [Lines::First].into_iter().chain((1..=3).map(Lines::All)).collect(),
         Kind::Pair => vec![Lines::None],
         Kind::Rgba => vec![Lines::First],
     }
@@ -53,11 +53,13 @@ fn every_program_is_valid() {
                     let limits = Limits {
                         ends: direct,
                         planes: chunks > 1,
+                        range: chunks == 3,
+                        perspective: chunks < 3,
                         plane_per_cell: direct && fragments != Fragments::Intersected,
                     };
                     let variant = Variant { kind, direct };
                     let arrays = arrays(chunks);
-                    let layout = Layout::new(fragments, kind.components(), lines);
+                    let layout = Layout::new(fragments, kind.components(), lines, fragments == Fragments::Intersected);
                     validated(&program(&variant, association, &switches, &layout, table.as_ref(), limits, &arrays));
                 }
             }
@@ -69,7 +71,12 @@ fn every_program_is_valid() {
 fn layouts_match_their_rust_twins() {
     for kind in KINDS {
         for (fragments, lines) in FORMS.into_iter().flat_map(|f| lines(kind).into_iter().map(move |l| (f, l))) {
-            let layout = Layout::new(fragments, kind.components(), lines);
+            let layout = Layout::new(
+                fragments,
+                kind.components(),
+                lines,
+                kind == Kind::Pair && fragments == Fragments::Intersected,
+            );
             let switches = Switches { fragments, ..Switches::default() };
             let module = validated(&program(
                 &Variant { kind, direct: false },
@@ -103,8 +110,8 @@ fn layouts_match_their_rust_twins() {
             }
             let locations: Vec<_> = attributes.iter().flatten().map(|a| a.shader_location as usize).collect();
             assert!(locations.iter().copied().eq(0..locations.len()), "{locations:?}");
-            // What all devices can do, but for many lines.
-            assert!(locations.len() <= 16 || matches!(lines, Lines::All(3..)), "{locations:?}");
+            // What all devices can do.
+            assert!(locations.len() <= 16, "{locations:?}");
         }
     }
 }
@@ -119,16 +126,16 @@ fn the_device_sorts_as_the_host_does() {
             .map(|_| {
                 seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
                 let hidden = (seed >> 20).is_multiple_of(5);
-                if hidden { HIDDEN } else { (seed >> 32) as u32 & mask & !IN_PARTS }
+                if hidden { HIDDEN } else { (seed >> 32) as u32 & mask & !(MOST_PARTS - 1) }
             })
             .collect();
         let expected = depth::order(&keys, true).cells;
         let usage = Usage::STORAGE | Usage::COPY_SRC;
         let buffer = Buffer::holding(&gpu, "keys", &keys, usage).unwrap();
-        let (numbers, count) = sorter.sort(&gpu, &buffer, keys.len(), 2).unwrap();
+        let (numbers, count) = sorter.sort(&gpu, &buffer, keys.len()).unwrap();
         let back = Readback::new(&gpu, 4 * count as u64).unwrap();
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        encoder.copy_buffer_to_buffer(&numbers.raw, 8, back.raw(), 0, 4 * count as u64);
+        encoder.copy_buffer_to_buffer(&numbers.raw, 0, back.raw(), 0, 4 * count as u64);
         let sorted: Vec<u32> =
             back.submit(&gpu, encoder, |bytes| bytemuck::cast_slice(&bytes[..4 * count]).to_vec()).unwrap();
         assert_eq!(sorted.len(), expected.len(), "{n} keys");
@@ -165,7 +172,9 @@ fn pictures_do_not_depend_on_who_sorts() {
         renderer.render(&view, &|_| ()).unwrap()
     });
     assert!(host.pixels.iter().any(|p| p[3] > 0.5));
-    assert!(host == device);
+    // On the host's way, records hold the function's lines: rounding differs.
+    let error = host.compare(&device).unwrap().max;
+    assert!(error < 2e-6, "{error:e}");
     let drawn = renderer.stats().projection.unwrap().drawn_cells;
     assert!(drawn > 0 && drawn < 6 * 8 * 8 * 8, "{drawn} cells drawn, some are empty");
 }
