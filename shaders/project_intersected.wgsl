@@ -68,8 +68,10 @@ fn grown(x: vec4f, y: vec4f) -> array<vec2f, 4> {
         let out = turn * GROWTH / reach;
         let moved_x = x + (before_y + after_y) * out;
         let moved_y = y - (before_x + after_x) * out;
-        let first = vec2f(moved_x.x, moved_y.x);
-        return array<vec2f, 4>(first, vec2f(moved_x.y, moved_y.y), vec2f(moved_x.z, moved_y.z), select(vec2f(moved_x.w, moved_y.w), first, is_triangle));
+        if is_triangle {
+            return pairs_of(moved_x.xyzx, moved_y.xyzx);
+        }
+        return parted(moved_x, moved_y);
     }
     // A sliver: the rectangle around it, along its longest side or diagonal.
     let q = array<vec2f, 4>(vec2f(x.x, y.x), vec2f(x.y, y.y), vec2f(x.z, y.z), vec2f(x.w, y.w));
@@ -82,6 +84,44 @@ fn grown(x: vec4f, y: vec4f) -> array<vec2f, 4> {
     let low = vec2f(least_of(along), least_of(aside)) - GROWTH;
     let high = vec2f(greatest_of(along), greatest_of(aside)) + GROWTH;
     return array<vec2f, 4>(q[0] + u * low.x + v * low.y, q[0] + u * high.x + v * low.y, q[0] + u * high.x + v * high.y, q[0] + u * low.x + v * high.y);
+}
+
+fn pairs_of(x: vec4f, y: vec4f) -> array<vec2f, 4> {
+    return array<vec2f, 4>(vec2f(x.x, y.x), vec2f(x.y, y.y), vec2f(x.z, y.z), vec2f(x.w, y.w));
+}
+
+/// `v` from component `by` on.
+fn turned(v: vec4f, by: u32) -> vec4f {
+    let once = select(v, v.yzwx, (by & 1u) != 0u);
+    return select(once, once.zwxy, (by & 2u) != 0u);
+}
+
+/// The four corners of an outline so that the first and the third part it into triangles. Rasterisers do blocks of pixels,
+/// and those on the diagonal twice: the shorter one is taken; or one triangle around all, where that is less.
+fn parted(x: vec4f, y: vec4f) -> array<vec2f, 4> {
+    let across = x.yzwx - x;
+    let down = y.yzwx - y;
+    // Without a side, those before and after it meet beyond it, if they do, and add twice this area.
+    let turns = abs(across * down.yzwx - down * across.yzwx);
+    let meet = (across.wxyz * down.yzwx - down.wxyz * across.yzwx) * sign(across.x * down.y - down.x * across.y);
+    let added = select(vec4f(FAR), turns.wxyz * turns / meet, meet > vec4f(1e-3));
+    let least = least_of(added);
+    let one = vec2f(x.z - x.x, y.z - y.x);
+    let other = vec2f(x.w - x.y, y.w - y.y);
+    let squares = vec2f(dot(one, one), dot(other, other));
+    if least * least > DOUBLED * DOUBLED * min(squares.x, squares.y) {
+        let by = select(0u, 1u, squares.y < squares.x);
+        return pairs_of(turned(x, by), turned(y, by));
+    }
+    let by = select(select(select(3u, 2u, added.z == least), 1u, added.y == least), 0u, added.x == least);
+    let u = turned(x, by);
+    let v = turned(y, by);
+    // The side from the first to the second corner is left out.
+    let a = vec2f(u.x - u.w, v.x - v.w);
+    let b = vec2f(u.y - u.x, v.y - v.x);
+    let c = vec2f(u.z - u.y, v.z - v.y);
+    let apex = vec2f(u.x, v.x) + a * ((b.x * c.y - b.y * c.x) / (a.x * c.y - a.y * c.x));
+    return pairs_of(vec4f(apex.x, u.zw, apex.x), vec4f(apex.y, v.zw, apex.y));
 }
 
 fn longer(a: vec2f, b: vec2f) -> vec2f {

@@ -57,6 +57,8 @@ pub(super) struct Limits {
     pub(super) range: bool,
     /// Whether rays meet at the eye.
     pub(super) perspective: bool,
+    /// Pixels along a side of the blocks that the rasteriser does at once.
+    pub(super) block: u32,
     /// One pair of a table's planes serves all fragments of a cell.
     pub(super) plane_per_cell: bool,
 }
@@ -79,6 +81,7 @@ impl Seen {
             range: frame.near > near || frame.far < FAR,
             perspective: self.perspective,
             plane_per_cell: false,
+            block: 1,
         }
     }
 

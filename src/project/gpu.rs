@@ -220,6 +220,8 @@ impl Project {
         let mut limits = seen.limits();
         // In parallel views all segments of a cell are on one plane.
         let one_plane = table.is_some_and(|t| t.choice().per_cell) || view.eye().is_none();
+        // Processors do 4 × 4 pixels, graphics cards 2 × 2.
+        limits.block = if self.sorts { 2 } else { 4 };
         limits.plane_per_cell = one_plane && switches.fragments != Fragments::Intersected;
         let source = program(&variant, association, switches, &layout, table.map(|t| &**t), limits, &arrays);
         self.prepare_canvas(&layout, view.size(), format)?;

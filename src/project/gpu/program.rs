@@ -119,7 +119,9 @@ pub(super) fn program(
     arrays: &[Array],
 ) -> String {
     let mut text = shader::prelude(variant);
-    for (name, value) in [("FAR", f64::from(FAR)), ("GROWTH", GROWTH), ("BESIDE", 1e-18)] {
+    // Twice the area of the blocks that a line of unit length passes, by its mean direction.
+    let doubled = 2.0 * f64::from(limits.block) * 4.0 / std::f64::consts::PI;
+    for (name, value) in [("FAR", f64::from(FAR)), ("GROWTH", GROWTH), ("BESIDE", 1e-18), ("DOUBLED", doubled)] {
         text += &format!("const {name} = {value:?}f;\n");
     }
     let form = match switches.fragments {

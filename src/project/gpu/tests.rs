@@ -55,6 +55,7 @@ fn every_program_is_valid() {
                         planes: chunks > 1,
                         range: chunks == 3,
                         perspective: chunks < 3,
+                        block: 4,
                         plane_per_cell: direct && fragments != Fragments::Intersected,
                     };
                     let variant = Variant { kind, direct };
