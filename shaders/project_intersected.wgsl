@@ -103,12 +103,12 @@ fn parted(x: vec4f, y: vec4f) -> array<vec2f, 4> {
     let down = y.yzwx - y;
     // Without a side, those before and after it meet beyond it, if they do, and add twice this area.
     let turns = abs(across * down.yzwx - down * across.yzwx);
-    let meet = (across.wxyz * down.yzwx - down.wxyz * across.yzwx) * sign(across.x * down.y - down.x * across.y);
-    let added = select(vec4f(FAR), turns.wxyz * turns / meet, meet > vec4f(1e-3));
-    let least = least_of(added);
     let one = vec2f(x.z - x.x, y.z - y.x);
     let other = vec2f(x.w - x.y, y.w - y.y);
     let squares = vec2f(dot(one, one), dot(other, other));
+    let meet = (across.wxyz * down.yzwx - down.wxyz * across.yzwx) * sign(one.x * other.y - one.y * other.x);
+    let added = select(vec4f(FAR), turns.wxyz * turns / meet, meet > vec4f(1e-3));
+    let least = least_of(added);
     if least * least > DOUBLED * DOUBLED * min(squares.x, squares.y) {
         let by = select(0u, 1u, squares.y < squares.x);
         return pairs_of(turned(x, by), turned(y, by));

@@ -53,53 +53,78 @@ fn extinction_between(line: Line, low: f32, high: f32) -> f32 {
     return select(0.0, max(ends.x, ends.y), a <= b);
 }
 
-/// The part of `ramp` from `start` to `end`, which is on one line: values are `a` to `b` above where `value` and `slope`
-/// say what the function is. Its colour, and how much comes through.
-fn on_line(ramp: Ramp, start: f32, end: f32, value: vec4f, slope: vec4f, a: f32, b: f32) -> vec4f {
-    let l = (end - start) * ramp.length;
-    let middle = (a + b) * 0.5;
-    let rise = (b - a) * ramp.sign;
-    let p = mild(fma(slope.x, middle, value.x) * l, slope.x * rise * l);
-    // The weighted mean of the colours at both ends is that of one place.
-    let place = fma(middle, p.y, rise * (p.z - 0.5 * p.y));
-    return vec4f(fma(slope.yzw, vec3f(place), value.yzw * p.y) * select(1.0, l, DIRECT), p.w);
+/// What a piece of an optical depth up to GREATEST does that is `rise` denser at its back than at its front: its opacity,
+/// the weight of its emission as in the middle, that of how much more it is at the back than at the front, and how much
+/// comes through. See `mild`, which goes further.
+fn piece_of(depth: f32, rise: f32) -> vec4f {
+    if !SLIGHT {
+        let p = mild(depth, rise);
+        return vec4f(p.x, p.y, p.z - 0.5 * p.y, p.w);
+    }
+    let h = depth * -0.5;
+    let h_square = h * h;
+    let square = depth * depth;
+    // In short chains: processors wait for results longer than they compute them.
+    let powers = fma(fma(h_square, 1.0 / 120.0, fma(h, 1.0 / 24.0, 1.0 / 6.0)), h_square, fma(h, 0.5, 1.0));
+    let q = -h * powers;
+    let e = 1.0 - q;
+    let even = fma(square, 1.0 / 1920.0, 1.0 / 24.0) * square;
+    let once = fma(square, 1.0 / 480.0, 1.0 / 12.0);
+    let twice = fma(square, 1.0 / 13440.0, 1.0 / 240.0);
+    let bent = fma(rise, fma(rise, 1.0 / 6720.0, twice), once);
+    let uneven = fma(rise, bent, even);
+    let opacity = q + q * e;
+    if DIRECT {
+        return vec4f(opacity, e + e * uneven, -e * (depth * bent), e * e);
+    }
+    return vec4f(opacity, opacity, fma(e, uneven, -0.5 * q * q), e * e);
 }
 
 /// Premultiplied colour and opacity of what of a segment is in the part of the cell that is drawn: piece by piece, each on
-/// one line and MILD, from the least value upward.
+/// one line and of a depth up to GREATEST, from the least value upward.
 fn by_lines(front: f32, back: f32, length: f32, words: Words) -> vec4f {
-    let ramp = ramp_of(front, back, length);
-    let places = words[LINES_AT + 2u * LINES];
-    // Where it is at these values: the last two are its ends.
-    let at = clamp((places - ramp.low) * ramp.share, vec4f(0.0), vec4f(1.0));
-    let width = MILD / max(words[STEEPEST_AT].w * length, MILD / 64.0);
+    let low = min(front, back);
+    let rises = front <= back;
+    let range = max(abs(back - front), FLAT);
+    let per_value = length / range;
+    // From the segment's least value.
+    let places = words[LINES_AT + 2u * LINES] - low;
+    // It is parted into a power of two, without a division.
+    let steps = clamp(words[STEEPEST_AT].w * length * (2.0 / GREATEST), 1.0, 4096.0);
+    let step = range * bitcast<f32>((254u - (bitcast<u32>(steps) >> 23u)) << 23u);
+    var at = max(places.z, 0.0);
+    let stop = max(min(places.w, range), at);
     var sum = vec4f(0.0, 0.0, 0.0, 1.0);
-    var start = at.z;
     loop {
         var value = words[LINES_AT];
         var slope = words[LINES_AT + 1u];
         var begin = places.z;
-        var end = at.w;
+        var end = stop;
         if LINES > 1u {
-            let is_beyond = start >= at.x;
+            let is_beyond = at >= places.x;
             value = select(value, words[LINES_AT + 2u % (2u * LINES)], is_beyond);
             slope = select(slope, words[LINES_AT + 3u % (2u * LINES)], is_beyond);
             begin = select(begin, places.x, is_beyond);
-            end = select(at.x, at.w, is_beyond);
+            end = select(min(end, places.x), end, is_beyond);
         }
         if LINES > 2u {
-            let is_beyond = start >= at.y;
+            let is_beyond = at >= places.y;
             value = select(value, words[LINES_AT + 4u % (2u * LINES)], is_beyond);
             slope = select(slope, words[LINES_AT + 5u % (2u * LINES)], is_beyond);
             begin = select(begin, places.y, is_beyond);
-            end = select(select(end, at.y, start >= at.x), at.w, is_beyond);
+            end = select(min(end, places.y), select(end, stop, is_beyond), is_beyond);
         }
-        end = min(min(end, at.w), start + width);
-        let a = fma(ramp.range, start, ramp.low) - begin;
-        let b = fma(ramp.range, end, ramp.low) - begin;
-        sum = joined(ramp, sum, on_line(ramp, start, end, value, slope, a, b));
-        start = end;
-        if !(start < at.w) {
+        end = min(end, at + step);
+        let l = (end - at) * per_value;
+        let middle = (at + end) * 0.5 - begin;
+        let rise = select(at - end, end - at, rises);
+        let p = piece_of(fma(slope.x, middle, value.x) * l, slope.x * rise * l);
+        // The weighted mean of the colours at both ends is that of one place.
+        let place = fma(middle, p.y, rise * p.z);
+        let color = fma(slope.yzw, vec3f(place), value.yzw * p.y) * select(1.0, l, DIRECT);
+        sum = vec4f(fma(color, vec3f(select(1.0, sum.w, rises)), sum.xyz * select(p.w, 1.0, rises)), sum.w * p.w);
+        at = end;
+        if !(at < stop) {
             break;
         }
     }

@@ -24,7 +24,7 @@ use halite::integral::table::Kind;
 use halite::mesh::{Array, Mesh, Values, generate};
 use halite::project::{Compositing, Fragments, Order, Switches, Target, Thickness};
 use halite::render::{self, Renderer};
-use halite::transfer::{Emission, TransferFunction};
+use halite::transfer::{Convention, Emission, TransferFunction};
 use halite::view::{Blend, Camera, Projection, View};
 
 fn renderer() -> Option<Renderer> {
@@ -73,37 +73,74 @@ fn one_colour_needs_no_order() {
     report.finish("one colour");
 }
 
-/// One cell has no order. Up to four lines of the function come with it, others are looked up; deep cells take steps.
+/// The cell that is drawn, and so many others that no ray meets.
+fn one_cell(others: usize) -> Mesh {
+    let cell = [dvec3(-1.0, -0.8, -0.9), dvec3(0.9, -1.0, -0.2), dvec3(-0.1, 1.0, -0.6), dvec3(0.2, 0.1, 1.0)];
+    let at = |i: usize| cell[0] - dvec3(0.01, 1e-4 * i as f64, 0.0);
+    let other = |i: usize| [at(i), at(i) + DVec3::X * 1e-5, at(i) + DVec3::Y * 1e-5, at(i) + DVec3::Z * 1e-5];
+    let points: Vec<DVec3> = cell.into_iter().chain((0..others).flat_map(other)).collect();
+    let cells: Vec<[u32; 4]> = (0..=others as u32).map(|i| [0, 1, 2, 3].map(|k| 4 * i + k)).collect();
+    draw::mesh_of(points, cells.iter().map(|c| (10, &c[..])))
+}
+
+/// One cell has no order. Up to three lines of the function come with it; where most cells have no more, those of more are
+/// drawn in parts, else lines are looked up. Deep cells take steps.
 #[test]
 fn one_cell_is_exact() {
     let Some(mut renderer) = renderer() else { return };
     let mut report = Report::default();
-    let corners = [dvec3(-1.0, -0.8, -0.9), dvec3(0.9, -1.0, -0.2), dvec3(-0.1, 1.0, -0.6), dvec3(0.2, 0.1, 1.0)];
-    let mesh = draw::mesh_of(corners.to_vec(), [(10, &[0, 1, 2, 3][..])]);
-    for lines in 1..=7 {
+    for (lines, others) in (1..=7).flat_map(|lines| [(lines, 0), (lines, 30)]) {
+        let mesh = one_cell(others);
         for depth in [0.1, 2.0, 20.0, 400.0] {
             for emission in [Emission::Chromatic, Emission::Direct { scale: 1.0 }] {
-                let case = format!("{lines} lines, depth {depth}, {emission:?}");
+                let case = format!("{lines} lines, {others} others, depth {depth}, {emission:?}");
                 let mut random = Random::of(&case);
-                let values = (0..4).map(|_| random.within(-0.2, 0.2)).chain([0.0, 1.0]).skip(2);
-                let array = Array { name: "s".into(), components: 1, values: Values::F64(values.collect()) };
+                let mut values: Vec<f64> = (0..4).map(|_| random.within(-0.2, 0.2)).chain([0.0, 1.0]).skip(2).collect();
+                values.resize(4 + 4 * others, 0.5);
+                let array = Array { name: "s".into(), components: 1, values: Values::F64(values) };
                 let places: Vec<f64> = (0..=lines).map(|i| -0.3 + 1.6 * f64::from(i) / f64::from(lines)).collect();
                 let opacity = places.iter().map(|&s| (s, random.within(0.0, depth))).collect();
                 let color = places.iter().map(|&s| (s, [0; 3].map(|_| random.within(0.0, 1.0)))).collect();
                 let transfer = TransferFunction::new(color, opacity, 1.0).unwrap().with_emission(emission).unwrap();
                 let scene = Scene::new(&mesh, array, Association::Point, |_| transfer);
                 set(&mut renderer, &scene);
-                for position in [dvec3(0.4, 0.3, 4.0), dvec3(-3.0, 1.0, -2.5), dvec3(0.05, 0.0, -0.2)] {
-                    let view = perspective(position, 60.0);
-                    let expected = Engine::Reference.image(&scene, &view);
-                    let got = image(&mut renderer, Switches::default(), &view);
+                let near = [dvec3(0.4, 0.3, 4.0), dvec3(-3.0, 1.0, -2.5), dvec3(0.05, 0.0, -0.2)];
+                let mut views: Vec<View> = near.into_iter().map(|p| perspective(p, 60.0)).collect();
+                let parallel = Projection::Parallel { parallel_scale: 1.2 };
+                views
+                    .push(View::new(Camera { projection: parallel, ..*views[1].camera().unwrap() }, [72, 64]).unwrap());
+                for (i, view) in views.iter().enumerate() {
+                    let expected = Engine::Reference.image(&scene, view);
+                    let got = image(&mut renderer, Switches::default(), view);
                     // What f32 tells of lengths.
-                    report.hold(&format!("{case}, from {position}"), &got, &expected, 2e-6 + 2e-7 * depth);
+                    report.hold(&format!("{case}, view {i}"), &got, &expected, 2e-6 + 5e-7 * depth);
                 }
             }
         }
     }
     report.finish("one cell");
+}
+
+/// The edges of an opaque stretch let light through where the field passes them, but not as constants: as on the CPU.
+#[test]
+fn constants_are_opaque_as_single_values() {
+    let Some(mut renderer) = renderer() else { return };
+    let mut report = Report::default();
+    let mesh = one_cell(2);
+    for (value, is_opaque) in [(0.5, false), (1.0, true), (1.5, true), (2.0, true), (2.5, false)] {
+        let array = Array { name: "s".into(), components: 1, values: Values::F64(vec![value, 0.0, 3.0]) };
+        let opacity = vec![(0.0, 0.1), (1.0, 0.1), (1.0, 1.0), (2.0, 1.0), (2.0, 0.05), (3.0, 0.05)];
+        let color = vec![(0.0, [1.0, 0.0, 0.0]), (3.0, [0.0, 1.0, 0.5])];
+        let transfer = TransferFunction::new(color, opacity, 1.0).unwrap().with_convention(Convention::Opacity);
+        let scene = Scene::new(&mesh, array, Association::Cell, |_| transfer);
+        set(&mut renderer, &scene);
+        let view = perspective(dvec3(0.4, 0.3, 4.0), 60.0);
+        let expected = Engine::Twin { threads: 2 }.image(&scene, &view);
+        let got = image(&mut renderer, Switches::default(), &view);
+        assert_eq!(got.pixels.iter().any(|p| p[3] > 0.999), is_opaque, "{value}");
+        report.hold(&format!("constant {value}"), &got, &expected, 2e-6);
+    }
+    report.finish("constants");
 }
 
 /// A peak of opacity in a field, seen at 60 degrees from near.

@@ -10,14 +10,19 @@ use crate::geometry::{Geometry, Values};
 use crate::gpu::Gpu;
 use crate::gpu::buffers::Buffer;
 use crate::gpu::raster::Texture;
-use crate::integral::{Exact, Knots};
+use crate::integral::{Exact, Knots, MILD};
 use crate::order::depth::MOST_PARTS;
 use rayon::prelude::*;
 
 const STRAIGHT: &str = include_str!("../../shaders/project_straight.wgsl");
 
-/// Optical depth of the longest segment up to which fragments go straight: as many steps as that, at most.
+/// Optical depth of the longest segment up to which fragments go straight, and up to which they take slight pieces of a
+/// series that is short.
 const DEEPEST: f64 = 64.0;
+const SLIGHT: f64 = 2.0;
+
+/// The greatest depth of a piece that is slight.
+const SLIGHT_PIECE: f64 = 0.25;
 
 /// The most lines that a record holds.
 const MOST: usize = 3;
@@ -36,7 +41,7 @@ pub(crate) enum Lines {
     /// The number of the least value's line: fragments look that up and those above one by one.
     First,
     /// So many lines, one to three. Cells may be drawn in parts; values are counted from the least.
-    All(usize),
+    All { count: usize, slight: bool },
 }
 
 /// The greatest extent of cells, in space and in values.
@@ -82,10 +87,12 @@ impl Lines {
         }
         // Shaders count the lines of bins, with one bin more on both sides.
         let within = |values: f32| exact.opacity.lines_within(values + 5.0 * (2.0 / BINS as f32));
-        let is_mild = f64::from(exact.opacity.steepest()) * extent.edge <= DEEPEST;
+        let depth = f64::from(exact.opacity.steepest()) * extent.edge;
         let most = if in_parts { MOST * MOST_PARTS as usize } else { MOST };
         match within(extent.values) {
-            lines if is_mild && lines <= most && within(extent.mean) <= MOST => Lines::All(lines.min(MOST)),
+            lines if depth <= DEEPEST && lines <= most && within(extent.mean) <= MOST => {
+                Lines::All { count: lines.min(MOST), slight: depth <= SLIGHT }
+            }
             _ => Lines::looked_up(exact.kind),
         }
     }
@@ -95,12 +102,12 @@ impl Lines {
         match self {
             Lines::None => 0,
             Lines::First => 1,
-            Lines::All(n) => 2 * n + 1,
+            Lines::All { count, .. } => 2 * count + 1,
         }
     }
 
     pub(super) fn are_all(self) -> bool {
-        matches!(self, Lines::All(_))
+        matches!(self, Lines::All { .. })
     }
 
     /// `lines_between`, which finds the words for a part of a cell, and `integrated`, the exact integral of a segment by
@@ -119,7 +126,11 @@ impl Lines {
                 }";
                 (0, find.into(), "return by_lookups(front, back, length, u32(words[LINES_AT].x));")
             }
-            Lines::All(n) => (n, STRAIGHT.into(), "return by_lines(last_of(front), last_of(back), length, words);"),
+            Lines::All { count, slight } => {
+                let greatest = if slight { SLIGHT_PIECE } else { MILD };
+                let find = format!("const SLIGHT = {slight};\nconst GREATEST = {greatest:?}f;\n{STRAIGHT}");
+                (count, find, "return by_lines(last_of(front), last_of(back), length, words);")
+            }
         };
         format!(
             "const LINES = {lines}u;

@@ -27,7 +27,9 @@ const FORMS: [Fragments; 3] = [Fragments::Intersected, Fragments::Interpolated, 
 /// The lines that records for such fields may have, unless there is a table.
 fn lines(kind: Kind) -> Vec<Lines> {
     match kind {
-        Kind::Scalar => [Lines::First].into_iter().chain((1..=3).map(Lines::All)).collect(),
+        Kind::Scalar => {
+            [Lines::First].into_iter().chain((1..=3).map(|count| Lines::All { count, slight: count != 2 })).collect()
+        }
         Kind::Pair => vec![Lines::None],
         Kind::Rgba => vec![Lines::First],
     }
