@@ -54,18 +54,27 @@ fn direction_at(xy: vec2f) -> vec3f {
     return fma(frame.direction[2].xyz, vec3f(xy.y), fma(frame.direction[1].xyz, vec3f(xy.x), frame.direction[0].xyz));
 }
 
-/// The square of the length of a ray's direction times `scale`, `offset` pixels from the one whose middle is `at`, is
+/// The square of the length of a ray's direction times `scale`, `offset` pixels from one whose direction is `way`, is
 /// stretch[0] · (1, x, y) + stretch[1] · (x², xy, y²).
-fn stretch_around(at: vec2f, scale: f32) -> array<vec3f, 2> {
-    let v = direction_at(sample_of(at)) * scale;
-    let x = frame.direction[1].xyz * (frame.pixel.x * scale);
-    let y = frame.direction[2].xyz * (frame.pixel.y * scale);
+fn stretch_around(way: vec3f, scale: f32) -> array<vec3f, 2> {
+    let v = way * scale;
+    let x = by_column(frame.ways) * scale;
+    let y = by_row(frame.ways) * scale;
     return array<vec3f, 2>(vec3f(dot(v, v), 2.0 * dot(v, x), 2.0 * dot(v, y)), vec3f(dot(x, x), 2.0 * dot(x, y), dot(y, y)));
 }
 
 fn stretch_of(linear: vec3f, square: vec3f, offset: vec2f) -> f32 {
     let right = fma(offset.x, square.x, fma(offset.y, square.y, linear.y));
     return sqrt(fma(offset.x, right, fma(offset.y, fma(offset.y, square.z, linear.z), linear.x)));
+}
+
+/// How what is by columns and rows differs from one pixel to the next on the right, and below.
+fn by_column(v: array<Twice, 3>) -> vec3f {
+    return v[1].high + v[1].low;
+}
+
+fn by_row(v: array<Twice, 3>) -> vec3f {
+    return v[2].high + v[2].low;
 }
 
 fn origin_at(xy: vec2f) -> vec3f {

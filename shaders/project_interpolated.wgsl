@@ -180,7 +180,7 @@ fn write_record(i: u32, whole: Solid, values: array<Value, 4>, piece: u32, rank:
     }
     var words: array<vec4f, 4>;
     let centre = floor(clamp(pixel_of(inside), vec2f(0.0), frame.size - 1.0)) + 0.5;
-    let stretch = stretch_around(centre, 1.0);
+    let stretch = stretch_around(direction_at(sample_of(centre)), 1.0);
     words[0] = vec4f(centre, vec2f(frame.near, frame.far) + frame.forward.w);
     words[1] = vec4f(stretch[0], longest);
     words[2] = vec4f(stretch[1], 0.0);

@@ -138,11 +138,9 @@ const EDGE_ON = 1e-5;
 /// cells that share one, a ray that lies in it meets exactly one. Less than outlines are grown by.
 const ASIDE = vec2f(4e-4, 1.7e-4);
 
-/// From `p` to the point at `t` of the ray of a pixel, of which column and row are whole numbers: as accurate as it is
-/// short, as faces that rays graze ask for that. `t` has 12 digits.
-fn way_to(pixel: vec2f, t: f32, p: Twice) -> vec3f {
-    let start = affine(frame.starts, pixel.x, pixel.y);
-    let way = affine(frame.ways, pixel.x, pixel.y);
+/// From `p` to the point at `t` of a ray from `start` along `way`: as accurate as it is short, as faces that rays graze
+/// ask for that. `t` has 12 digits.
+fn way_to(start: Twice, way: Twice, t: f32, p: Twice) -> vec3f {
     let high = shortened(way.high);
     let low = (way.high - high) + way.low;
     let q = sum(p.high, -start.high);
@@ -168,7 +166,9 @@ fn write_record(i: u32, solid: Solid, v: array<Value, 4>, piece: u32, rank: u32)
         centre = pixel_of(seen(centroid));
     }
     centre = floor(clamp(centre, vec2f(0.0), frame.size - 1.0)) + 0.5;
-    let xy = sample_of(centre);
+    let pixel = centre - 0.5;
+    let start = affine(frame.starts, pixel.x, pixel.y);
+    let way = affine(frame.ways, pixel.x, pixel.y);
     let longest = max(max(max(length(solid.b), length(solid.c)), max(length(solid.d), distance(solid.b, solid.c))), max(distance(solid.b, solid.d), distance(solid.c, solid.d)));
     // Where the pixel's ray is as deep as the cell's middle, how far that is from one pixel to the next, and from the
     // eye.
@@ -180,11 +180,10 @@ fn write_record(i: u32, solid: Solid, v: array<Value, 4>, piece: u32, rank: u32)
     // Few digits, so that products with it are exact.
     t = shortened(vec3f(t)).x;
     let depth = select(1.0, t + frame.forward.w, PERSPECTIVE);
-    let along = direction_at(xy);
-    let right = fma(frame.direction[1].xyz, vec3f(t), frame.origin[0].xyz) * frame.pixel.x;
-    let down = fma(frame.direction[2].xyz, vec3f(t), frame.origin[1].xyz) * frame.pixel.y;
-    let out = along * depth;
-    let away = way_to(centre - 0.5, t, solid.a);
+    let right = fma(by_column(frame.ways), vec3f(t), by_column(frame.starts));
+    let down = fma(by_row(frame.ways), vec3f(t), by_row(frame.starts));
+    let out = way.high * depth;
+    let away = way_to(start, way, t, solid.a);
     // Inward normals, but for the sign of the volume, of the faces opposite to each corner.
     let n = array<vec3f, 4>(-cross(solid.c - solid.b, solid.d - solid.b), cross(solid.c, solid.d), cross(solid.d, solid.b), cross(solid.b, solid.c));
     let volume = dot(solid.b, n[1]);
@@ -212,7 +211,7 @@ fn write_record(i: u32, solid: Solid, v: array<Value, 4>, piece: u32, rank: u32)
     let low = min(min(v[0], v[1]), min(v[2], v[3]));
     let high = max(max(v[0], v[1]), max(v[2], v[3]));
     words[3] = vec4f(centre, last_of(high) - last_of(low), f32(bits.x | bits.y | bits.z | bits.w));
-    let stretch = stretch_around(centre, depth);
+    let stretch = stretch_around(way.high, depth);
     words[4] = vec4f(stretch[0], longest);
     words[5] = vec4f(stretch[1], 0.0);
     var limits = vec2f(t - frame.near, t - frame.far);

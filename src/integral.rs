@@ -23,6 +23,7 @@ pub use batch::Batch;
 pub use choice::{Choice, Form};
 pub(crate) use knots::BUCKETS;
 pub use knots::Knots;
+pub(crate) use knots::Line;
 pub use lookup::{Integral, Lookup};
 
 use crate::field::{Kind, Normal};

@@ -4,13 +4,14 @@
 //! more than two of them, and are thin: then a record holds these, and fragments go through them straight. Cells of more
 //! lines are drawn in parts, each between two of the values where lines meet.
 
+use super::frame::FAR;
 use crate::error::Result;
 use crate::field::Kind;
 use crate::geometry::{Geometry, Values};
 use crate::gpu::Gpu;
 use crate::gpu::buffers::Buffer;
 use crate::gpu::raster::Texture;
-use crate::integral::{Exact, Knots, MILD};
+use crate::integral::{Exact, Knots, Line, MILD};
 use crate::order::depth::MOST_PARTS;
 use rayon::prelude::*;
 
@@ -146,12 +147,14 @@ impl Lines {
 }
 
 /// The lines as an image: value, slope, and below each other the two ends and the number of the line of a single value,
-/// [`LINES_ACROSS`] in a row.
+/// [`LINES_ACROSS`] in a row. After them come some that no value is on, as many as a cell's parts may look for in vain.
 ///
 /// # Errors
 /// Those of [`Texture::new`].
 pub(super) fn image(gpu: &Gpu, exact: &Exact<f32>) -> Result<Texture> {
-    let lines = exact.opacity.lines();
+    let mut lines = exact.opacity.lines();
+    let none = Line { value: [0.0; 4], slope: [0.0; 4], ends: [FAR; 2], single: 0 };
+    lines.resize(lines.len() + MOST * MOST_PARTS as usize, none);
     let across = lines.len().clamp(1, LINES_ACROSS);
     let size = [across as u32, 3 * lines.len().div_ceil(across).max(1) as u32];
     let mut texels = vec![[0.0; 4]; size[0] as usize * size[1] as usize];
