@@ -1,10 +1,10 @@
 // The exact integral by the lines of the transfer function that come with a cell. Values count from the cell's least one.
 
 /// What of the function comes with a part of a cell: for each of its LINES value and slope, then where the second and the
-/// third begin and between which values the part is; and the greatest extinction.
+/// third begin and between which values the part is; and how many pieces a length of one is at least, twice.
 struct Lines {
     words: array<vec4f, 2u * LINES + 1u>,
-    steepest: f32,
+    pieces: f32,
 }
 
 /// Of the `piece` of a cell that is drawn at this turn, the whole being between two values, and at `eye` if it reached to
@@ -25,23 +25,24 @@ fn lines_between(low: f32, high: f32, eye: f32, piece: u32) -> Lines {
     var lines: Lines;
     lines.words[0] = line.value + line.slope * (start - line.ends.x);
     lines.words[1] = line.slope;
-    lines.steepest = extinction_between(line, low, high);
+    var steepest = extinction_between(line, low, high);
     var begin = vec2f(FAR);
     if LINES > 1u {
         begin.x = line.ends.y - low;
         line = line_of(i + 1u);
         lines.words[2u % (2u * LINES)] = line.value;
         lines.words[3u % (2u * LINES)] = line.slope;
-        lines.steepest = max(lines.steepest, extinction_between(line, low, high));
+        steepest = max(steepest, extinction_between(line, low, high));
     }
     if LINES > 2u {
         begin.y = line.ends.y - low;
         line = line_of(i + 2u);
         lines.words[4u % (2u * LINES)] = line.value;
         lines.words[5u % (2u * LINES)] = line.slope;
-        lines.steepest = max(lines.steepest, extinction_between(line, low, high));
+        steepest = max(steepest, extinction_between(line, low, high));
     }
     lines.words[2u * LINES] = vec4f(begin, start - low, select(line.ends.y - low, FAR, part + 1u == parts));
+    lines.pieces = steepest * (2.0 / GREATEST);
     return lines;
 }
 
@@ -89,9 +90,9 @@ fn by_lines(front: f32, back: f32, length: f32, words: Words) -> vec4f {
     let per_value = length / range;
     // From the segment's least value.
     let places = words[LINES_AT + 2u * LINES] - low;
-    // It is parted into a power of two, without a division.
-    let steps = clamp(words[STEEPEST_AT].w * length * (2.0 / GREATEST), 1.0, 4096.0);
-    let step = range * bitcast<f32>((254u - (bitcast<u32>(steps) >> 23u)) << 23u);
+    // It is parted into a power of two, by the exponent: without a division.
+    let pieces = fma(words[PIECES_AT].w, length, 1.0);
+    let step = range * bitcast<f32>((254u - min(bitcast<u32>(pieces) >> 23u, 139u)) << 23u);
     var at = max(places.z, 0.0);
     let stop = max(min(places.w, range), at);
     var sum = vec4f(0.0, 0.0, 0.0, 1.0);

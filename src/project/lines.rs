@@ -23,7 +23,7 @@ const DEEPEST: f64 = 64.0;
 const SLIGHT: f64 = 2.0;
 
 /// The greatest depth of a piece that is slight.
-const SLIGHT_PIECE: f64 = 0.25;
+const SLIGHT_PIECE: f64 = 0.3;
 
 /// The most lines that a record holds.
 const MOST: usize = 3;
@@ -136,7 +136,7 @@ impl Lines {
         format!(
             "const LINES = {lines}u;
             const LINES_AT = {at}u;
-            const STEEPEST_AT = {}u;
+            const PIECES_AT = {}u;
             {find}
             fn integrated(front: Value, back: Value, length: f32, words: Words) -> vec4f {{
                 {integral}

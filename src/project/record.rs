@@ -129,7 +129,7 @@ impl Layout {
             None if i >= lines_at && self.lines.are_all() => format!("lines.words[{}]", i - lines_at),
             None if i >= lines_at => format!("lines[{}]", i - lines_at),
             None if i >= usual => "rare".into(),
-            None if i + 1 == usual && self.lines.are_all() => format!("vec4f(words[{i}].xyz, lines.steepest)"),
+            None if i + 1 == usual && self.lines.are_all() => format!("vec4f(words[{i}].xyz, lines.pieces)"),
             None => format!("words[{i}]"),
             Some(k) => format!("vec4f({})", (4 * k..4 * k + 4).map(packed).collect::<Vec<_>>().join(", ")),
         };
