@@ -101,13 +101,13 @@ fn turned(v: vec4f, by: u32) -> vec4f {
 fn parted(x: vec4f, y: vec4f) -> array<vec2f, 4> {
     let across = x.yzwx - x;
     let down = y.yzwx - y;
-    // Without a side, those before and after it meet beyond it, if they do, and add twice this area.
+    // Without a side, those before and after it meet beyond it, and add twice this area, if they do, and not far away.
     let turns = abs(across * down.yzwx - down * across.yzwx);
     let one = vec2f(x.z - x.x, y.z - y.x);
     let other = vec2f(x.w - x.y, y.w - y.y);
     let squares = vec2f(dot(one, one), dot(other, other));
     let meet = (across.wxyz * down.yzwx - down.wxyz * across.yzwx) * sign(one.x * other.y - one.y * other.x);
-    let added = select(vec4f(FAR), turns.wxyz * turns / meet, meet > vec4f(1e-3));
+    let added = select(vec4f(FAR), turns.wxyz * turns / meet, meet > max(turns * 0.25, vec4f(1e-3)));
     let least = least_of(added);
     if least * least > DOUBLED * DOUBLED * min(squares.x, squares.y) {
         let by = select(0u, 1u, squares.y < squares.x);

@@ -1,8 +1,8 @@
 //! What of the transfer function comes with the record of a cell.
 //!
-//! A look-up of the function is dear in software, and so is a loop over the lines that a segment is on. Most cells have no
-//! more than two of them, and are thin: then a record holds these, and fragments go through them straight. Cells of more
-//! lines are drawn in parts, each between two of the values where lines meet.
+//! A look-up of the function is dear in software. Most cells have no more than three lines of it, and are thin: then a
+//! record holds these, and fragments go through those that they cross. Cells of more lines are drawn in parts, each between
+//! two of the values where lines meet.
 
 use super::frame::FAR;
 use crate::error::Result;
