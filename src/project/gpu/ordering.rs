@@ -1,7 +1,7 @@
 //! Which cells are seen, and in which order they are drawn.
 
 use super::{BATCH, Pass, Project, Slice, groups_of, unprepared};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::buffers::Buffer;
 use crate::gpu::raster::Readback;
 use crate::gpu::sort::Sorter;
@@ -88,6 +88,10 @@ impl Project {
         switches: &Switches,
         lines: Lines,
     ) -> Result<Ordered> {
+        if cells > 1 << PIECE {
+            let what = format!("the projection engine draws {} cells at most, not {cells}", 1 << PIECE);
+            return Err(Error::Render(format!("{what}; the engine \"traverse\" draws more")));
+        }
         let parts = Parts::new(switches, lines);
         let ordered = |cells, entries, chunk, chunks| Ordered {
             frame: seen.frame,
