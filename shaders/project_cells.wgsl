@@ -60,15 +60,9 @@ fn end_below(s: f32) -> i32 {
     return clamp(i32((s + 1.0) * (f32(BINS) / 2.0)) - 1, 0, i32(BINS) - 1);
 }
 
-/// In how many parts a cell is drawn whose values are between two; 0 if the function shows nothing of it.
-fn parts_of(low: f32, high: f32) -> u32 {
-    let below = bins[end_below(low)];
-    let above = bins[min(end_below(high) + 3, i32(BINS))];
-    var parts = 1u;
-    if LINES > 0u && FORM == INTERSECTED {
-        parts = min((above.y - below.y) / max(LINES, 1u) + 1u, MOST_PARTS);
-    }
-    return select(0u, parts, above.x > below.x);
+/// Whether the function shows anything of a cell whose values are between two.
+fn shows(low: f32, high: f32) -> bool {
+    return bins[min(end_below(high) + 3, i32(BINS))].x > bins[end_below(low)].x;
 }
 
 /// The line of the least of a cell's values.
@@ -94,7 +88,7 @@ fn circumcentre(p: array<vec3f, 4>) -> vec3f {
     return (dot(b, b) * cross(c, d) + dot(c, c) * cross(d, b) + dot(d, d) * cross(b, c)) / (2.0 * dot(b, cross(c, d)));
 }
 
-/// A key that falls as the depth rises; HIDDEN if nothing of the cell is seen.
+/// A key that falls as the depth rises; HIDDEN if nothing of the cell is seen. As `keys.rs` finds them on the host.
 fn key_of(cell: u32) -> u32 {
     let corners = cells(cell);
     let v = values_of(cell, corners);
@@ -102,8 +96,7 @@ fn key_of(cell: u32) -> u32 {
         return HIDDEN;
     }
     let s = vec4f(last_of(v[0]), last_of(v[1]), last_of(v[2]), last_of(v[3]));
-    var parts = parts_of(min(min(s.x, s.y), min(s.z, s.w)), max(max(s.x, s.y), max(s.z, s.w)));
-    if parts == 0u {
+    if !shows(min(min(s.x, s.y), min(s.z, s.w)), max(max(s.x, s.y), max(s.z, s.w))) {
         return HIDDEN;
     }
     let p = solid_of(corners).p;
@@ -127,8 +120,7 @@ fn key_of(cell: u32) -> u32 {
             return HIDDEN;
         }
     }
-    let is_near = any(w < vec4f(frame.nearest));
-    if !is_near {
+    if all(w >= vec4f(frame.nearest)) {
         // Between the centres of pixels.
         let left = (x / w - frame.offset.x + 1.0) * (0.5 * frame.size.x);
         let down = (1.0 + frame.offset.y - y / w) * (0.5 * frame.size.y);
@@ -156,11 +148,8 @@ fn key_of(cell: u32) -> u32 {
     }
     let bits = bitcast<u32>(depth);
     let ascending = select(bits | 0x80000000u, ~bits, (bits >> 31u) == 1u);
-    if is_near && FORM != INTERSECTED {
-        parts = 3u;
-    }
     // No finite depth gives HIDDEN.
-    return (~ascending & ~(MOST_PARTS - 1u)) | (parts - 1u);
+    return ~ascending;
 }
 
 @compute @workgroup_size(64)

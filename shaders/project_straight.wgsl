@@ -7,6 +7,12 @@ struct Lines {
     pieces: f32,
 }
 
+/// In how many parts a cell is drawn whose values are between two: as `keys.rs` says.
+fn parts_of(low: f32, high: f32) -> u32 {
+    let lines = bins[min(end_below(high) + 3, i32(BINS))].y - bins[end_below(low)].y;
+    return min(lines / LINES + 1u, MOST_PARTS);
+}
+
 /// Of the `piece` of a cell that is drawn at this turn, the whole being between two values, and at `eye` if it reached to
 /// there.
 fn lines_between(low: f32, high: f32, eye: f32, piece: u32) -> Lines {

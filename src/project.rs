@@ -6,6 +6,7 @@
 
 mod frame;
 pub(crate) mod gpu;
+mod keys;
 mod lines;
 mod record;
 

@@ -4,7 +4,7 @@ use crate::geometry::Geometry;
 use crate::gpu::arrays;
 use crate::view::{Fan, View};
 use bytemuck::{Pod, Zeroable};
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
 /// Stands for ±∞ in limits of t, which are within ±10 else.
@@ -12,6 +12,9 @@ pub(super) const FAR: f32 = 1e30;
 
 /// Up to this distance from the mesh's centre, in normalised units, rays start at the eye.
 const NEAR_EYE: f64 = 2.0;
+
+/// How much an outline is grown, in pixels: rasterisers round corners to this.
+pub(super) const GROWTH: f32 = 1.0 / 256.0;
 
 /// Cells that reach nearer to the plane through the eye of a perspective view than this, in normalised units, are
 /// special.
@@ -29,14 +32,31 @@ pub(super) struct Frame {
     direction: [[f32; 4]; 3],
     starts: [[[f32; 4]; 2]; 3],
     ways: [[[f32; 4]; 2]; 3],
-    size: [f32; 2],
-    offset: [f32; 2],
-    near: f32,
-    far: f32,
-    nearest: f32,
+    pub(super) size: [f32; 2],
+    pub(super) offset: [f32; 2],
+    pub(super) near: f32,
+    pub(super) far: f32,
+    pub(super) nearest: f32,
     planes: u32,
     pixel: [f32; 2],
     unused: [f32; 2],
+}
+
+impl Frame {
+    /// The place that coordinates are relative to.
+    pub(super) fn base(&self) -> DVec3 {
+        [self.base, self.base_low].map(|v| Vec4::from(v).truncate().as_dvec3()).into_iter().sum()
+    }
+
+    /// What a point is multiplied with for its place in the image, to the right and up, times its depth, and for that.
+    pub(super) fn axes(&self) -> [Vec3; 3] {
+        [self.across[0], self.across[1], self.forward].map(|v| Vec4::from(v).truncate())
+    }
+
+    /// The depth of the base in a perspective view.
+    pub(super) fn ahead(&self) -> f32 {
+        self.forward[3]
+    }
 }
 
 /// A view as the shaders see it.

@@ -1,6 +1,7 @@
 //! The engine on a device: what it holds, and the passes of a frame.
 //!
-//! 1. `classify` (compute) finds the cells that are seen, and a key of depth for each.
+//! 1. `classify` (compute) finds the cells that are seen, and a key of depth for each; for devices in software the host
+//!    does.
 //! 2. These are sorted.
 //! 3. Batch by batch, in that order, `project` (compute) makes a record of each cell, and the records are drawn.
 
@@ -51,6 +52,7 @@ struct HeldFunction {
     buffers: [Buffer; 3],
     lines: Texture,
     bins: Buffer,
+    ends: Vec<lines::End>,
 }
 
 /// A device, and what of the mesh, field and function it holds.
@@ -135,6 +137,7 @@ impl Project {
     #[cfg(test)]
     pub(crate) fn sort_on_device(&mut self, sorts: bool) {
         (self.sorts, self.ordered) = (sorts, None);
+        self.programs.clear();
     }
 
     /// Takes `part` for changed.
@@ -174,11 +177,15 @@ impl Project {
         let gpu = &self.gpu;
         let function = match self.function.take() {
             Some(function) => function,
-            None => HeldFunction {
-                buffers: function::upload(gpu, exact)?,
-                lines: lines::image(gpu, exact)?,
-                bins: lines::bins(gpu, exact)?,
-            },
+            None => {
+                let ends = lines::bins(exact);
+                HeldFunction {
+                    buffers: function::upload(gpu, exact)?,
+                    lines: lines::image(gpu, exact)?,
+                    bins: Buffer::holding(gpu, "bins", &ends, Usage::STORAGE)?,
+                    ends,
+                }
+            }
         };
         self.table.prepare(gpu, table, &self.function.insert(function).buffers)
     }
@@ -231,7 +238,7 @@ impl Project {
         if !self.ordered.as_ref().is_some_and(|o| o.holds_for(&seen, switches, lines)) {
             let start = Instant::now();
             self.ordered = None;
-            self.ordered = Some(self.order(&frame, &seen, geometry.cells.len(), switches, lines)?);
+            self.ordered = Some(self.order(&frame, &seen, geometry, values, switches, lines)?);
             counts.order_ms = start.elapsed().as_secs_f64() * 1e3;
         }
         self.draw(&frame, view, &mut counts).map(|pixels| (pixels, counts))
@@ -294,7 +301,7 @@ struct Pass {
 impl Pass {
     fn new(project: &Project, seen: &Seen) -> Result<Self> {
         let gpu = &project.gpu;
-        let (Some(HeldFunction { buffers: function, lines, bins }), Some(program), Some(table)) =
+        let (Some(HeldFunction { buffers: function, lines, bins, .. }), Some(program), Some(table)) =
             (&project.function, project.programs.first(), project.table.get())
         else {
             return Err(unprepared());

@@ -9,10 +9,10 @@ use crate::error::Result;
 use crate::field::Kind;
 use crate::geometry::{Geometry, Values};
 use crate::gpu::Gpu;
-use crate::gpu::buffers::Buffer;
 use crate::gpu::raster::Texture;
 use crate::integral::{Exact, Knots, Line, MILD};
 use crate::order::depth::MOST_PARTS;
+use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
 const STRAIGHT: &str = include_str!("../../shaders/project_straight.wgsl");
@@ -129,7 +129,9 @@ impl Lines {
             }
             Lines::All { count, slight } => {
                 let greatest = if slight { SLIGHT_PIECE } else { MILD };
-                let find = format!("const SLIGHT = {slight};\nconst GREATEST = {greatest:?}f;\n{STRAIGHT}");
+                let find = format!(
+                    "const SLIGHT = {slight};\nconst GREATEST = {greatest:?}f;\nconst MOST_PARTS = {MOST_PARTS}u;\n{STRAIGHT}"
+                );
                 (count, find, "return by_lines(last_of(front), last_of(back), length, words);")
             }
         };
@@ -171,23 +173,29 @@ pub(super) fn image(gpu: &Gpu, exact: &Exact<f32>) -> Result<Texture> {
     Ok(texture)
 }
 
-/// For each of the [`BINS`] + 1 ends of bins: the number of bins below it in which something may be seen, and the line
-/// that it is on.
-///
-/// # Errors
-/// Those of [`Buffer::new`].
-pub(super) fn bins(gpu: &Gpu, exact: &Exact<f32>) -> Result<Buffer> {
+/// What is known of an end of a bin.
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct End {
+    /// The number of bins below it in which something may be seen.
+    pub(super) shown: u32,
+    /// The line that it is on.
+    pub(super) line: u32,
+}
+
+/// The [`BINS`] + 1 ends of bins.
+pub(super) fn bins(exact: &Exact<f32>) -> Vec<End> {
     // Where emission is not bound to extinction, another component may shine.
     let shines = exact.direct && exact.kind != Kind::Scalar;
     let begins: Vec<f32> = exact.opacity.lines().iter().filter(|l| l.ends[0] < l.ends[1]).map(|l| l.ends[0]).collect();
     let at = |b: usize| (2.0 * b as f64 / BINS as f64 - 1.0) as f32;
     let shows = |knots: &Knots<f32>, b: usize| shines || knots.shows(at(b), at(b + 1), exact.direct);
-    let mut below = vec![[0u32; 2]; BINS + 1];
+    let mut ends = vec![End::default(); BINS + 1];
     for b in 0..=BINS {
-        below[b][1] = begins.partition_point(|&s| s <= at(b)).max(1) as u32 - 1;
+        ends[b].line = begins.partition_point(|&s| s <= at(b)).max(1) as u32 - 1;
         if b > 0 {
-            below[b][0] = below[b - 1][0] + u32::from(shows(&exact.opacity, b - 1));
+            ends[b].shown = ends[b - 1].shown + u32::from(shows(&exact.opacity, b - 1));
         }
     }
-    Buffer::holding(gpu, "bins", &below, wgpu::BufferUsages::STORAGE)
+    ends
 }

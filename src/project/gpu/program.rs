@@ -8,8 +8,8 @@ use crate::gpu::raster::{self, Slot};
 use crate::gpu::shader::{self, Array, Variant};
 use crate::gpu::table::{self, TABLE};
 use crate::integral::Lookup;
-use crate::order::depth::{HIDDEN, MOST_PARTS};
-use crate::project::frame::{FAR, Limits};
+use crate::order::depth::HIDDEN;
+use crate::project::frame::{FAR, GROWTH, Limits};
 use crate::project::lines::{BINS, LINES_ACROSS};
 use crate::project::record::Layout;
 use crate::project::{Compositing, Fragments, Order, Switches, Thickness};
@@ -34,9 +34,6 @@ const INTERPOLATED: [&str; 2] = [
 /// Programs that are kept: edits of the function, and what cuts rays off, go to and fro between some.
 const KEPT: usize = 4;
 
-/// How much an outline is grown, in pixels: rasterisers round corners to this.
-const GROWTH: f64 = 1.0 / 256.0;
-
 /// Loop iterations of a fragment that llvmpipe surely makes: see `traverse::gpu`.
 const MOST_WORK: u32 = 8000;
 
@@ -47,7 +44,8 @@ pub(super) struct Program {
     compositing: Compositing,
     pub(super) layout: Layout,
     pub(super) arrays: wgpu::BindGroupLayout,
-    pub(super) classify: wgpu::ComputePipeline,
+    /// On devices that sort.
+    pub(super) classify: Option<wgpu::ComputePipeline>,
     pub(super) project: wgpu::ComputePipeline,
     pub(super) draw: wgpu::RenderPipeline,
 }
@@ -84,7 +82,7 @@ impl Project {
         // The outline of an intersected cell may be no more than that: grown, it need not turn one way.
         let culled = (switches.fragments != Fragments::Intersected).then_some(wgpu::Face::Back);
         let program = Program {
-            classify: raster::compute(gpu, &module, "classify", &cells),
+            classify: self.sorts.then(|| raster::compute(gpu, &module, "classify", &cells)),
             project: raster::compute(gpu, &module, "project_all", &cells),
             draw: raster::render(
                 gpu,
@@ -121,7 +119,9 @@ pub(super) fn program(
     let mut text = shader::prelude(variant);
     // Twice the area of the blocks that a line of unit length passes, by its mean direction.
     let doubled = 2.0 * f64::from(limits.block) * 4.0 / std::f64::consts::PI;
-    for (name, value) in [("FAR", f64::from(FAR)), ("GROWTH", GROWTH), ("BESIDE", 1e-18), ("DOUBLED", doubled)] {
+    for (name, value) in
+        [("FAR", f64::from(FAR)), ("GROWTH", f64::from(GROWTH)), ("BESIDE", 1e-18), ("DOUBLED", doubled)]
+    {
         text += &format!("const {name} = {value:?}f;\n");
     }
     let form = match switches.fragments {
@@ -142,7 +142,7 @@ pub(super) fn program(
         text += &format!("const {name} = {value};\n");
     }
     text += &format!(
-        "const LINES_ACROSS = {LINES_ACROSS}u;\nconst HIDDEN = {HIDDEN}u;\nconst MOST_PARTS = {MOST_PARTS}u;\nconst BINS = {BINS}u;\nconst PIECE = {PIECE}u;\nconst MOST_WORK = {MOST_WORK}u;\n\
+        "const LINES_ACROSS = {LINES_ACROSS}u;\nconst HIDDEN = {HIDDEN}u;\nconst BINS = {BINS}u;\nconst PIECE = {PIECE}u;\nconst MOST_WORK = {MOST_WORK}u;\n\
          const INTERSECTED = 0u;\nconst INTERPOLATED = 1u;\nconst LINEAR = 2u;\nconst FORM = {form};\n\
          const POINT = 0u;\nconst CORNER = 1u;\nconst CELL = 2u;\nconst ASSOCIATION = {association};\n"
     );

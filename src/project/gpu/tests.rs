@@ -8,11 +8,11 @@ use crate::gpu::testing::{gpu, validated};
 use crate::integral::lookup::tests::{choices, exact};
 use crate::mesh::{cells::Tetrahedra, generate};
 use crate::order::depth::{self, HIDDEN, MOST_PARTS};
-use crate::project::Compositing;
 use crate::project::frame::{Frame, Limits};
+use crate::project::{Compositing, Order};
 use crate::render::{Engine, Renderer};
 use crate::transfer::{Emission, TransferFunction};
-use crate::view::{Camera, Projection};
+use crate::view::{Camera, ClippingPlane, Projection};
 use glam::{DVec3, dvec3};
 use wgpu::naga;
 
@@ -167,19 +167,45 @@ fn chosen(gpu: &Gpu) -> DeviceChoice {
 }
 
 #[test]
-fn pictures_do_not_depend_on_who_sorts() {
+fn pictures_do_not_depend_on_who_finds_the_order() {
     let Some(gpu) = gpu() else { return };
-    let (mut renderer, view) = prepared(Engine::Project, chosen(&gpu), 8, [48, 40]);
-    let [host, device] = [false, true].map(|on_device| {
-        renderer.project().unwrap().sort_on_device(on_device);
-        renderer.render(&view, &|_| ()).unwrap()
-    });
-    assert!(host.pixels.iter().any(|p| p[3] > 0.5));
-    // On the host's way, records hold the function's lines: rounding differs.
-    let error = host.compare(&device).unwrap().max;
-    assert!(error < 2e-6, "{error:e}");
-    let drawn = renderer.stats().projection.unwrap().drawn_cells;
-    assert!(drawn > 0 && drawn < 6 * 8 * 8 * 8, "{drawn} cells drawn, some are empty");
+    let (mut renderer, outside) = prepared(Engine::Project, chosen(&gpu), 8, [48, 40]);
+    let camera = *outside.camera().unwrap();
+    let of = |camera: Camera| View::new(camera, [48, 40]).unwrap();
+    let parallel = of(Camera { projection: Projection::Parallel { parallel_scale: 0.9 }, ..camera });
+    let plane = ClippingPlane { origin: dvec3(0.1, 0.0, 0.0), normal: dvec3(1.0, 0.3, 0.0) };
+    let views = [
+        outside.clone(),
+        outside.clone().with_clipping_range([2.9, 3.6]).unwrap(),
+        outside.clone().with_clipping_planes(vec![plane]).unwrap(),
+        parallel.clone(),
+        parallel.with_clipping_range([3.0, 4.0]).unwrap(),
+        of(Camera { position: dvec3(0.1, 0.2, 0.3), ..camera }),
+        // Most cells are between the centres of pixels.
+        of(Camera { position: dvec3(10.0, 20.0, 30.0), ..camera }),
+    ];
+    let mut drawn = vec![];
+    for order in [Order::Depth, Order::Circumsphere] {
+        renderer.set_switches(Switches { order, ..Switches::default() });
+        for (i, view) in views.iter().enumerate() {
+            let [host, device] = [false, true].map(|on_device| {
+                renderer.project().unwrap().sort_on_device(on_device);
+                let image = renderer.render(view, &|_| ()).unwrap();
+                (image, renderer.stats().projection.unwrap().drawn_cells)
+            });
+            // On the host's way, records hold the function's lines: rounding differs.
+            let error = host.0.compare(&device.0).unwrap().max;
+            assert!(error < 2e-6, "{order:?}, view {i}: {error:e}");
+            assert_eq!(host.1, device.1, "{order:?}, view {i}: cells drawn");
+            assert!(host.0.pixels.iter().any(|p| p[3] > 0.1), "{order:?}, view {i} is empty");
+            drawn.push(host.1);
+        }
+    }
+    let all = 6 * 8 * 8 * 8;
+    assert!(drawn[0] > all / 4 && drawn[0] < all, "some cells are empty: {drawn:?}");
+    for limited in [1, 2, 4, 5, 6] {
+        assert!(drawn[limited] < drawn[0], "view {limited} hides nothing: {drawn:?}");
+    }
 }
 
 #[test]
