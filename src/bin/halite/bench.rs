@@ -3,7 +3,7 @@ use crate::{output, progress};
 use anyhow::{Context, Result};
 use clap::Args;
 use halite::gpu::{self, DeviceChoice};
-use halite::render::{Renderer, Stats};
+use halite::render::{ProjectionStats, Renderer, Stats};
 use halite::transfer::TransferFunction;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -12,7 +12,7 @@ use std::time::Instant;
 /// Measure how long pictures take
 ///
 /// Loads once, then draws the same view several times on the chosen device, and on each other device of this machine
-/// unless one was named. Times are medians.
+/// unless one was named. Times are medians; the JSON tells those of the projection engine's passes, that of ordering by edits.
 #[derive(Args)]
 pub(crate) struct Options {
     #[command(flatten)]
@@ -125,12 +125,15 @@ fn measure(options: &Options, job: &Job, renderer: &mut Renderer) -> Result<Run>
             .with_clamp(old.clamp())
             .with_emission(old.emission())?;
         let (mut frames, mut edits) = (Vec::new(), Vec::new());
+        let (mut still, mut moved) = (Vec::new(), Vec::new());
         for i in 0..options.frames {
             frames.push(draw(renderer)?);
+            still.extend(renderer.stats().projection);
             share(2 * i + 2);
             // To and fro, so that every edit is one.
             renderer.set_transfer(if i % 2 == 0 { &edited } else { &job.scene.transfer });
             edits.push(draw(renderer)?);
+            moved.extend(renderer.stats().projection);
             if tabulated {
                 renderer.wait_for_table();
                 draw(renderer)?;
@@ -144,8 +147,27 @@ fn measure(options: &Options, job: &Job, renderer: &mut Renderer) -> Result<Run>
         draw(renderer)?;
         let times =
             Times { load: job.load_ms, split: job.split_ms, first_frame, transfer_edit: Some(median(&mut edits)) };
-        Ok(Run { stats: renderer.stats().clone(), times, frame_ms: median(&mut frames) })
+        let mut stats = renderer.stats().clone();
+        if let Some(projection) = &mut stats.projection {
+            *projection = medians(*projection, &still, &moved);
+        }
+        Ok(Run { stats, times, frame_ms: median(&mut frames) })
     })
+}
+
+/// `last` with the median times of still views, but that of ordering by views after an edit.
+fn medians(last: ProjectionStats, still: &[ProjectionStats], edited: &[ProjectionStats]) -> ProjectionStats {
+    let of = |time: &dyn Fn(&ProjectionStats) -> Option<f64>| {
+        let mut times: Vec<f64> = still.iter().filter_map(time).collect();
+        (!times.is_empty()).then(|| median(&mut times))
+    };
+    let mut orders: Vec<f64> = edited.iter().map(|p| p.order_ms).collect();
+    ProjectionStats {
+        order_ms: median(&mut orders),
+        project_ms: of(&|p| p.project_ms),
+        draw_ms: of(&|p| p.draw_ms),
+        ..last
+    }
 }
 
 fn median(values: &mut [f64]) -> f64 {
