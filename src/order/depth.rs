@@ -12,9 +12,8 @@ pub const HIDDEN: u32 = u32::MAX;
 /// Parts that a cell is drawn in at most, a power of two: the last bits of its key are one less than its number of parts.
 pub const MOST_PARTS: u32 = 4;
 
-/// Bits of a key that one pass sorts by.
+/// Bits of a key that one pass sorts by at most.
 const BITS: u32 = 11;
-const DIGITS: usize = 1 << BITS;
 
 /// Cells that one task handles at least.
 const LEAST: usize = 1 << 14;
@@ -22,49 +21,62 @@ const LEAST: usize = 1 << 14;
 /// A key and its cell.
 type Item = (u32, u32);
 
+/// How many of `n` one task handles.
+fn block_of(n: usize) -> usize {
+    n.div_ceil(4 * rayon::current_num_threads()).max(LEAST)
+}
+
 /// The order that `keys` say, one for each cell; without `sort`, that in which the cells are stored.
 pub fn order(keys: &[u32], sort: bool) -> VisibilityOrder {
-    let parts = |key: u32| if key == HIDDEN { 0 } else { (key % MOST_PARTS) as usize + 1 };
-    let items: Vec<Item> = keys
-        .par_iter()
-        .with_min_len(LEAST)
+    let block = block_of(keys.len());
+    let blocks: Vec<Vec<Item>> = keys
+        .par_chunks(block)
         .enumerate()
-        .flat_map_iter(|(cell, &key)| std::iter::repeat_n((key, cell as u32), parts(key)))
+        .map(|(i, part)| {
+            let mut items = Vec::with_capacity(part.len());
+            for (&key, cell) in part.iter().zip((i * block) as u32..) {
+                if key != HIDDEN {
+                    (0..=key % MOST_PARTS).for_each(|_| items.push((key, cell)));
+                }
+            }
+            items
+        })
         .collect();
+    let items = blocks.concat();
     let (items, provenance) = if sort { (sorted(items), Provenance::Depth) } else { (items, Provenance::None) };
-    VisibilityOrder { cells: items.into_par_iter().map(|(_, cell)| cell).collect(), provenance }
+    VisibilityOrder { cells: items.into_iter().map(|(_, cell)| cell).collect(), provenance }
 }
 
 /// `items` in ascending order of their keys; equal ones stay in sequence.
 fn sorted(mut items: Vec<Item>) -> Vec<Item> {
     let mut other = vec![(0, 0); items.len()];
-    for shift in (0..u32::BITS).step_by(BITS as usize) {
-        if pass(&items, &mut other, shift) {
-            std::mem::swap(&mut items, &mut other);
-        }
+    // Depths of a frame have their first bits in common.
+    let (all, any) = items.iter().fold((!0, 0), |(all, any), item| (all & item.0, any | item.0));
+    let differing = u32::BITS - (all ^ any).leading_zeros();
+    let bits = differing.div_ceil(differing.div_ceil(BITS).max(1)).max(1);
+    for shift in (0..differing).step_by(bits as usize) {
+        pass(&items, &mut other, shift, 1 << bits);
+        std::mem::swap(&mut items, &mut other);
     }
     items
 }
 
-/// Sorts by one digit; false, and nothing is done, if all have the same.
-fn pass(from: &[Item], to: &mut [Item], shift: u32) -> bool {
-    let digit = |item: &Item| (item.0 >> shift) as usize % DIGITS;
-    let block = from.len().div_ceil(4 * rayon::current_num_threads()).max(LEAST);
+/// Sorts by one digit, of so many there are.
+fn pass(from: &[Item], to: &mut [Item], shift: u32, digits: usize) {
+    let digit = |item: &Item| (item.0 >> shift) as usize & (digits - 1);
+    let block = block_of(from.len());
     let counts: Vec<Vec<u32>> = from
         .par_chunks(block)
         .map(|part| {
-            let mut counts = vec![0; DIGITS];
+            let mut counts = vec![0; digits];
             part.iter().for_each(|item| counts[digit(item)] += 1);
             counts
         })
         .collect();
-    if from.first().is_none_or(|f| counts.iter().map(|c| c[digit(f)] as usize).sum::<usize>() == from.len()) {
-        return false;
-    }
     // Where each block puts its items of each digit: digits first, then blocks, so that equal ones stay in sequence.
-    let mut places: Vec<Vec<&mut [Item]>> = counts.iter().map(|_| Vec::with_capacity(DIGITS)).collect();
+    let mut places: Vec<Vec<&mut [Item]>> = counts.iter().map(|_| Vec::with_capacity(digits)).collect();
     let mut rest = to;
-    for d in 0..DIGITS {
+    for d in 0..digits {
         for (places, counts) in places.iter_mut().zip(&counts) {
             let (own, others) = rest.split_at_mut(counts[d] as usize);
             places.push(own);
@@ -80,7 +92,6 @@ fn pass(from: &[Item], to: &mut [Item], shift: u32) -> bool {
             }
         }
     });
-    true
 }
 
 #[cfg(test)]
