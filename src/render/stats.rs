@@ -47,7 +47,7 @@ pub struct Stats {
 /// What the projection engine did in the last frame.
 #[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize)]
 pub struct ProjectionStats {
-    /// Cells that were drawn; parts count, where a cell is drawn in parts.
+    /// Cells that were drawn, each once, also where it is drawn in parts.
     pub drawn_cells: u64,
     /// Finding the cells that are seen and sorting them, in ms; 0 if the camera stood still.
     pub order_ms: f64,
