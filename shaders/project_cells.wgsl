@@ -14,7 +14,7 @@ struct Part {
 /// For each end of the BINS equal bins of the values' range: in how many below it something may be seen, and its line.
 @group(2) @binding(1) var<storage, read> bins: array<vec2u>;
 @group(2) @binding(2) var<storage, read_write> keys: array<u32>;
-/// Cells from back to front, and, from PIECE on, how many parts of the cell came before.
+/// Cells from back to front, and, from bit PART on, how many parts of the cell came before.
 @group(2) @binding(3) var<storage, read> order: array<u32>;
 @group(2) @binding(4) var<storage, read_write> records: array<Record>;
 
@@ -167,9 +167,9 @@ fn project_all(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let entry = order[part.first + i];
-    let cell = entry & ((1u << PIECE) - 1u);
+    let cell = entry & ((1u << PART) - 1u);
     let corners = cells(cell);
-    write_record(i, solid_of(corners), values_of(cell, corners), entry >> PIECE, part.rank + i);
+    write_record(i, solid_of(corners), values_of(cell, corners), entry >> PART, part.rank + i);
 }
 
 /// How the four directions from the eye to the corners depend on each other: Σ a p = 0, the sum of a being six volumes.

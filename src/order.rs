@@ -2,11 +2,18 @@
 
 pub mod depth;
 
+/// The bit of an entry from which on it says how many parts of the cell came before; those below it are the cell.
+pub const PART: u32 = 30;
+
+/// Parts that a cell is drawn in at most.
+pub const MOST_PARTS: u32 = 1 << (u32::BITS - PART);
+
 /// The cells of a frame from back to front, and where the sequence comes from.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct VisibilityOrder {
-    /// Indices of the cells to draw. A cell that is drawn in several parts is there as often, one after another.
-    pub cells: Vec<u32>,
+    /// Indices of the cells to draw, below 2³⁰. A cell that is drawn in several parts is there as often, one after another,
+    /// with the number of the part from bit [`PART`] on.
+    pub entries: Vec<u32>,
     /// What decided.
     pub provenance: Provenance,
 }

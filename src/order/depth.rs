@@ -3,14 +3,12 @@
 //! A key is a number without sign that falls as the cell's depth rises, so that ascending keys are back to front. Cells
 //! of equal keys stay as they are stored, so that every run draws the same.
 
-use super::{Provenance, VisibilityOrder};
+use super::{MOST_PARTS, PART, Provenance, VisibilityOrder};
 use rayon::prelude::*;
 
-/// The key of a cell that is not drawn.
+/// The key of a cell that is not drawn. The last bits of any other, as many as [`MOST_PARTS`] needs, are one less than the
+/// number of its parts.
 pub const HIDDEN: u32 = u32::MAX;
-
-/// Parts that a cell is drawn in at most, a power of two: the last bits of its key are one less than its number of parts.
-pub const MOST_PARTS: u32 = 4;
 
 /// Bits of a key that one pass sorts by at most.
 const BITS: u32 = 11;
@@ -18,7 +16,7 @@ const BITS: u32 = 11;
 /// Cells that one task handles at least.
 const LEAST: usize = 1 << 14;
 
-/// A key and its cell.
+/// A key and its entry.
 type Item = (u32, u32);
 
 /// How many of `n` one task handles.
@@ -36,37 +34,50 @@ pub fn order(keys: &[u32], sort: bool) -> VisibilityOrder {
             let mut items = Vec::with_capacity(part.len());
             for (&key, cell) in part.iter().zip((i * block) as u32..) {
                 if key != HIDDEN {
-                    (0..=key % MOST_PARTS).for_each(|_| items.push((key, cell)));
+                    (0..=key % MOST_PARTS).for_each(|part| items.push((key, cell | part << PART)));
                 }
             }
             items
         })
         .collect();
-    let items = blocks.concat();
-    let (items, provenance) = if sort { (sorted(items), Provenance::Depth) } else { (items, Provenance::None) };
-    VisibilityOrder { cells: items.into_iter().map(|(_, cell)| cell).collect(), provenance }
+    let digits = if sort { digits_of(&blocks) } else { vec![] };
+    let provenance = if sort { Provenance::Depth } else { Provenance::None };
+    let entries = sorted(blocks, &digits).into_par_iter().map(|(_, entry)| entry).collect();
+    VisibilityOrder { entries, provenance }
 }
 
-/// `items` in ascending order of their keys; equal ones stay in sequence.
-fn sorted(mut items: Vec<Item>) -> Vec<Item> {
-    let mut other = vec![(0, 0); items.len()];
-    // Depths of a frame have their first bits in common.
-    let (all, any) = items.iter().fold((!0, 0), |(all, any), item| (all & item.0, any | item.0));
-    let differing = u32::BITS - (all ^ any).leading_zeros();
-    let bits = differing.div_ceil(differing.div_ceil(BITS).max(1)).max(1);
-    for shift in (0..differing).step_by(bits as usize) {
-        pass(&items, &mut other, shift, 1 << bits);
+/// The digits that keys are sorted by: the bit where each begins, and how many values it has. Depths of a frame have
+/// their first bits in common.
+fn digits_of(blocks: &[Vec<Item>]) -> Vec<(u32, usize)> {
+    let either = |a: (u32, u32), b: (u32, u32)| (a.0 & b.0, a.1 | b.1);
+    let none = (u32::MAX, 0);
+    let bits = blocks.par_iter().map(|part| part.iter().fold(none, |bits, &(key, _)| either(bits, (key, key))));
+    let (all, any) = bits.reduce(|| none, either);
+    let differing = u32::BITS - (any & !all).leading_zeros();
+    let count = differing.div_ceil(BITS).max(1);
+    let bits = differing.div_ceil(count);
+    (0..count).map(|i| (i * bits, 1 << bits)).collect()
+}
+
+/// The items of all blocks in ascending order of their keys' digits; equal ones stay in sequence.
+fn sorted(blocks: Vec<Vec<Item>>, digits: &[(u32, usize)]) -> Vec<Item> {
+    let n = blocks.iter().map(Vec::len).sum();
+    let [mut items, mut other] = [(); 2].map(|()| vec![(0, 0); n]);
+    let blocks: Vec<&[Item]> = blocks.iter().map(Vec::as_slice).collect();
+    // Without digits, one of a single value: they are joined.
+    pass(&blocks, &mut items, *digits.first().unwrap_or(&(0, 1)));
+    for &digit in digits.iter().skip(1) {
+        pass(&items.chunks(block_of(n)).collect::<Vec<_>>(), &mut other, digit);
         std::mem::swap(&mut items, &mut other);
     }
     items
 }
 
-/// Sorts by one digit, of so many there are.
-fn pass(from: &[Item], to: &mut [Item], shift: u32, digits: usize) {
+/// Sorts the items of `blocks` by one digit.
+fn pass(blocks: &[&[Item]], to: &mut [Item], (shift, digits): (u32, usize)) {
     let digit = |item: &Item| (item.0 >> shift) as usize & (digits - 1);
-    let block = block_of(from.len());
-    let counts: Vec<Vec<u32>> = from
-        .par_chunks(block)
+    let counts: Vec<Vec<u32>> = blocks
+        .par_iter()
         .map(|part| {
             let mut counts = vec![0; digits];
             part.iter().for_each(|item| counts[digit(item)] += 1);
@@ -83,8 +94,8 @@ fn pass(from: &[Item], to: &mut [Item], shift: u32, digits: usize) {
             rest = others;
         }
     }
-    from.par_chunks(block).zip(places).for_each(|(part, mut places)| {
-        for item in part {
+    blocks.par_iter().zip(places).for_each(|(part, mut places)| {
+        for item in *part {
             let place = &mut places[digit(item)];
             if let Some((next, others)) = std::mem::take(place).split_first_mut() {
                 *next = *item;
@@ -103,7 +114,7 @@ mod tests {
     fn expected(keys: &[u32]) -> Vec<u32> {
         let mut items: Vec<Item> = keys.iter().copied().zip(0..).filter(|i| i.0 != HIDDEN).collect();
         items.sort_by_key(|i| i.0);
-        items.iter().flat_map(|&(key, cell)| vec![cell; (key % MOST_PARTS) as usize + 1]).collect()
+        items.iter().flat_map(|&(key, cell)| (0..=key % MOST_PARTS).map(move |part| cell | part << PART)).collect()
     }
 
     proptest! {
@@ -111,7 +122,7 @@ mod tests {
         fn orders_as_a_stable_sort_does(keys in prop::collection::vec(prop_oneof![any::<u32>(), 0..9u32, Just(HIDDEN)], 0..3000)) {
             let order = order(&keys, true);
             prop_assert_eq!(order.provenance, Provenance::Depth);
-            prop_assert_eq!(order.cells, expected(&keys));
+            prop_assert_eq!(order.entries, expected(&keys));
         }
     }
 
@@ -119,8 +130,8 @@ mod tests {
     fn many_blocks_are_one_order() {
         // Few keys, many of each: a block out of sequence would show.
         let keys: Vec<u32> = (0..300_000u32).map(|i| i.wrapping_mul(0x9e37_79b9) >> 25 << 20).collect();
-        assert_eq!(order(&keys, true).cells, expected(&keys));
+        assert_eq!(order(&keys, true).entries, expected(&keys));
         let seen: Vec<u32> = (0..300_000).filter(|&i| keys[i as usize] & 1 == 0).collect();
-        assert_eq!(order(&keys, false).cells, seen);
+        assert_eq!(order(&keys, false).entries, seen);
     }
 }

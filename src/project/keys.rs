@@ -7,7 +7,8 @@ use super::Order;
 use super::frame::{FAR, GROWTH, Seen};
 use super::lines::{self, BINS};
 use crate::geometry::{Cell, Geometry, Values};
-use crate::order::depth::{HIDDEN, MOST_PARTS};
+use crate::order::MOST_PARTS;
+use crate::order::depth::HIDDEN;
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 

@@ -11,7 +11,7 @@ use crate::geometry::{Geometry, Values};
 use crate::gpu::Gpu;
 use crate::gpu::raster::Texture;
 use crate::integral::{Exact, Knots, Line, MILD};
-use crate::order::depth::MOST_PARTS;
+use crate::order::MOST_PARTS;
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 

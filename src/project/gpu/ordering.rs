@@ -5,18 +5,17 @@ use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Values};
 use crate::gpu::buffers::Buffer;
 use crate::gpu::sort::Sorter;
+use crate::order::PART;
 use crate::order::depth::{self, HIDDEN};
 use crate::project::frame::{Frame, Seen};
 use crate::project::keys::{self, Parts};
 use crate::project::lines::Lines;
 use crate::project::{Fragments, Order, Switches};
+use rayon::prelude::*;
 use wgpu::BufferUsages as Usage;
 
 /// Entries of one buffer of the order, a multiple of [`BATCH`].
 pub(super) const ORDER_CHUNK: usize = BATCH << 6;
-
-/// The bit of an entry from which on it says how many parts of the cell came before; those below it are the cell.
-pub(super) const PIECE: u32 = 30;
 
 impl Parts {
     fn new(switches: &Switches, lines: Lines) -> Self {
@@ -50,18 +49,6 @@ impl Ordered {
     }
 }
 
-/// Writes into the entries of each cell, which come one after another, how many came before, and counts cells.
-fn number_parts(order: &mut [u32]) -> usize {
-    let (mut last, mut part, mut cells) = (None, 0, 0);
-    for entry in order {
-        part = if last == Some(*entry) { part + 1 } else { 0 };
-        cells += usize::from(part == 0);
-        last = Some(*entry);
-        *entry |= part << PIECE;
-    }
-    cells
-}
-
 impl Project {
     /// Finds the cells that are seen, and sorts them.
     pub(super) fn order<const N: usize>(
@@ -74,8 +61,8 @@ impl Project {
         lines: Lines,
     ) -> Result<Ordered> {
         let (cells, by) = (geometry.cells.len(), switches.order);
-        if cells > 1 << PIECE {
-            let what = format!("the projection engine draws {} cells at most, not {cells}", 1 << PIECE);
+        if cells > 1 << PART {
+            let what = format!("the projection engine draws {} cells at most, not {cells}", 1 << PART);
             return Err(Error::Render(format!("{what}; the engine \"traverse\" draws more")));
         }
         let parts = Parts::new(switches, lines);
@@ -101,9 +88,8 @@ impl Project {
         }
         let bins = &self.function.as_ref().ok_or_else(unprepared)?.ends;
         let keys = keys::keys(geometry, values, bins, seen, by, parts);
-        let mut order = depth::order(&keys, by != Order::None).cells;
-        drop(keys);
-        let cells = number_parts(&mut order);
+        let order = depth::order(&keys, by != Order::None).entries;
+        let cells = keys.into_par_iter().filter(|&key| key != HIDDEN).count();
         let chunks = order.chunks(ORDER_CHUNK).map(|part| Buffer::holding(&self.gpu, "order", part, Usage::STORAGE));
         Ok(ordered(cells, order.len(), ORDER_CHUNK, chunks.collect::<Result<_>>()?))
     }

@@ -1,13 +1,13 @@
 //! What the programs are compiled from, and for.
 
 use super::Project;
-use super::ordering::PIECE;
 use crate::error::Result;
 use crate::gpu::arrays;
 use crate::gpu::raster::{self, Slot};
 use crate::gpu::shader::{self, Array, Variant};
 use crate::gpu::table::{self, TABLE};
 use crate::integral::Lookup;
+use crate::order::PART;
 use crate::order::depth::HIDDEN;
 use crate::project::frame::{FAR, GROWTH, Limits};
 use crate::project::lines::{BINS, LINES_ACROSS};
@@ -142,7 +142,7 @@ pub(super) fn program(
         text += &format!("const {name} = {value};\n");
     }
     text += &format!(
-        "const LINES_ACROSS = {LINES_ACROSS}u;\nconst HIDDEN = {HIDDEN}u;\nconst BINS = {BINS}u;\nconst PIECE = {PIECE}u;\nconst MOST_WORK = {MOST_WORK}u;\n\
+        "const LINES_ACROSS = {LINES_ACROSS}u;\nconst HIDDEN = {HIDDEN}u;\nconst BINS = {BINS}u;\nconst PART = {PART}u;\nconst MOST_WORK = {MOST_WORK}u;\n\
          const INTERSECTED = 0u;\nconst INTERPOLATED = 1u;\nconst LINEAR = 2u;\nconst FORM = {form};\n\
          const POINT = 0u;\nconst CORNER = 1u;\nconst CELL = 2u;\nconst ASSOCIATION = {association};\n"
     );

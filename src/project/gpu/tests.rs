@@ -7,7 +7,8 @@ use crate::gpu::raster::Readback;
 use crate::gpu::testing::{gpu, validated};
 use crate::integral::lookup::tests::{choices, exact};
 use crate::mesh::{cells::Tetrahedra, generate};
-use crate::order::depth::{self, HIDDEN, MOST_PARTS};
+use crate::order::MOST_PARTS;
+use crate::order::depth::{self, HIDDEN};
 use crate::project::frame::{Frame, Limits};
 use crate::project::{Compositing, Order};
 use crate::render::{Engine, Renderer};
@@ -132,7 +133,7 @@ fn the_device_sorts_as_the_host_does() {
                 if hidden { HIDDEN } else { (seed >> 32) as u32 & mask & !(MOST_PARTS - 1) }
             })
             .collect();
-        let expected = depth::order(&keys, true).cells;
+        let expected = depth::order(&keys, true).entries;
         let usage = Usage::STORAGE | Usage::COPY_SRC;
         let buffer = Buffer::holding(&gpu, "keys", &keys, usage).unwrap();
         let (numbers, count) = sorter.sort(&gpu, &buffer, keys.len()).unwrap();
