@@ -8,6 +8,7 @@ pub(crate) mod clock;
 pub mod construct;
 pub(crate) mod function;
 pub(crate) mod raster;
+pub(crate) mod rays;
 pub(crate) mod shader;
 pub(crate) mod sort;
 pub(crate) mod table;

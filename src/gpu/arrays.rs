@@ -1,10 +1,9 @@
 //! The mesh's arrays as shaders of all engines read them.
 
-use super::Gpu;
 use super::buffers::Chunks;
+use super::{Gpu, rays};
 use crate::error::Result;
 use crate::geometry::{Geometry, Values};
-use glam::DVec3;
 
 /// An element of [`points`]: each coordinate is the sum of two. They are read in pairs, as devices in software take
 /// each read for itself.
@@ -23,7 +22,7 @@ pub(crate) const INVISIBLE: f32 = 3e38;
 /// Those of [`Chunks::new`].
 pub(crate) fn points(gpu: &Gpu, geometry: &Geometry) -> Result<Chunks> {
     Chunks::new(gpu, "points", &geometry.points, |&p| {
-        let [[x, y, z], [x_low, y_low, z_low]] = twice(p);
+        let [[x, y, z], [x_low, y_low, z_low]] = rays::twice(p);
         [x, y, z, x_low, y_low, z_low]
     })
 }
@@ -48,20 +47,4 @@ pub(crate) fn association<const N: usize>(values: &Values<N>) -> &'static str {
         Values::Corner(_) => "CORNER",
         Values::Cell(_) => "CELL",
     }
-}
-
-/// `v` as a sum of two vectors of f32.
-pub(crate) fn twice(v: DVec3) -> [[f32; 3]; 2] {
-    let high = v.as_vec3();
-    [high, (v - high.as_dvec3()).as_vec3()].map(|v| v.to_array())
-}
-
-/// What the shader computes v · (1, i, j) from: the products of pixels and high parts are exact.
-pub(crate) fn affine([first, by_column, by_row]: [DVec3; 3]) -> [[[f32; 4]; 2]; 3] {
-    let short = |v: DVec3| {
-        let high = v.as_vec3().to_array().map(|x| f32::from_bits(x.to_bits() & !0x3fff));
-        let low = (v - DVec3::from(high.map(f64::from))).as_vec3();
-        [[high[0], high[1], high[2], 0.0], low.extend(0.0).to_array()]
-    };
-    [twice(first).map(|[x, y, z]| [x, y, z, 0.0]), short(by_column), short(by_row)]
 }

@@ -1,14 +1,10 @@
 //! What a frame's shaders need to know of a view and a transfer function.
 
 use crate::geometry::Geometry;
-use crate::gpu::arrays;
-use crate::view::{Fan, View};
+use crate::gpu::rays::{self, FAR};
+use crate::view::View;
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat3, DVec3, Vec3, Vec4};
-use rayon::prelude::*;
-
-/// Stands for ±∞ in limits of t, which are within ±10 else.
-pub(super) const FAR: f32 = 1e30;
 
 /// Up to this distance from the mesh's centre, in normalised units, rays start at the eye.
 const NEAR_EYE: f64 = 2.0;
@@ -114,16 +110,8 @@ impl Seen {
         // What the image spans at depth 1 (perspective) or at any (parallel).
         let spans = if perspective { [fan.direction[1], fan.direction[2]] } else { [fan.origin[1], fan.origin[2]] };
         let inverse = DMat3::from_cols(spans[0], spans[1], fan.direction[0]).inverse();
-        let planes: Vec<[f32; 4]> = view
-            .clipping_planes()
-            .iter()
-            .map(|p| {
-                let normal = (p.normal / p.normal.abs().max_element()).normalize();
-                four(normal, normal.dot((geometry.centre - p.origin) * geometry.scale + base))
-            })
-            .collect();
-        let ends = ends(view, &fan, geometry.scale);
-        let limit = |t: f64| (t as f32).clamp(-FAR, FAR);
+        let planes = rays::planes(view, geometry, base);
+        let ends = rays::ends(view, &fan, geometry.scale, false);
         let frame = Frame {
             base: four(high, 0.0),
             base_low: four(base - high, 0.0),
@@ -131,12 +119,12 @@ impl Seen {
             forward: four(inverse.row(2), if perspective { fan.ahead } else { 0.0 }),
             origin: [fan.origin[1], fan.origin[2]].map(|v| four(v, 0.0)),
             direction: fan.direction.map(|v| four(v, 0.0)),
-            starts: arrays::affine(fan.by_pixel(fan.origin, view.size())),
-            ways: arrays::affine(fan.by_pixel(fan.direction, view.size())),
+            starts: rays::affine(fan.by_pixel(fan.origin, view.size())),
+            ways: rays::affine(fan.by_pixel(fan.direction, view.size())),
             size: view.size().map(|n| n as f32),
             offset: fan.offset.as_vec2().to_array(),
-            near: limit(fan.near),
-            far: limit(fan.far),
+            near: rays::limit(fan.near),
+            far: rays::limit(fan.far),
             nearest: if perspective { (fan.near + fan.ahead).max(NEAREST) as f32 } else { 0.0 },
             planes: planes.len() as u32,
             unused: [0.0; 2],
@@ -144,19 +132,4 @@ impl Seen {
         };
         Seen { frame, perspective, planes, ends }
     }
-}
-
-/// Where a depth buffer ends each pixel's ray, as the shader counts t; empty without one.
-fn ends(view: &View, fan: &Fan, scale: f64) -> Vec<f32> {
-    if !view.has_depth() {
-        return vec![];
-    }
-    let [w, h] = view.size();
-    let pixels = 0..w as usize * h as usize;
-    let end = |p: usize| {
-        let ray = view.ray((p % w as usize) as u32, (p / w as usize) as u32);
-        let start = fan.ahead / ray.direction.dot(view.forward());
-        ((ray.t_max * scale - start) as f32).clamp(-FAR, FAR)
-    };
-    pixels.into_par_iter().map(end).collect()
 }

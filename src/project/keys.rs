@@ -4,9 +4,10 @@
 //! itself, lane by lane; here, what is needed of a point is found once.
 
 use super::Order;
-use super::frame::{FAR, GROWTH, Seen};
+use super::frame::{GROWTH, Seen};
 use super::lines::{self, BINS};
 use crate::geometry::{Cell, Geometry, Values};
+use crate::gpu::rays::FAR;
 use crate::order::MOST_PARTS;
 use crate::order::depth::HIDDEN;
 use glam::{DVec3, Vec2, Vec3};

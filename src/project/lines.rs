@@ -4,12 +4,12 @@
 //! record holds these, and fragments go through those that they cross. Cells of more lines are drawn in parts, each between
 //! two of the values where lines meet.
 
-use super::frame::FAR;
 use crate::error::Result;
 use crate::field::Kind;
 use crate::geometry::{Geometry, Values};
 use crate::gpu::Gpu;
 use crate::gpu::raster::Texture;
+use crate::gpu::rays::FAR;
 use crate::integral::{Exact, Knots, Line, MILD};
 use crate::order::MOST_PARTS;
 use bytemuck::{Pod, Zeroable};

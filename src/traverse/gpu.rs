@@ -6,12 +6,13 @@ use crate::geometry::boundary::{BoundaryFace, LEAF};
 use crate::geometry::{Cell, Geometry, Values};
 use crate::gpu::buffers::{Buffer, Chunks};
 use crate::gpu::function;
+use crate::gpu::rays::{self, FAR};
 use crate::gpu::shader::{self, Array, Binding, Variant};
 use crate::gpu::table::{self, TABLE};
 use crate::gpu::{Gpu, Part, arrays, raster};
 use crate::integral::{Exact, Lookup};
 use crate::mesh::faces::BOUNDARY;
-use crate::view::{Blend, Fan, View};
+use crate::view::{Blend, View};
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -41,9 +42,6 @@ const RAYS: u64 = 1 << 21;
 
 /// Loop iterations of one ray that llvmpipe surely makes: an eighth of those that 8 rays may make together.
 const LLVMPIPE_WORK: u32 = 4000;
-
-/// Stands for ±∞ in limits of t, which are within ±10 else.
-const FAR: f32 = 1e30;
 
 /// Opacity of a pixel whose ray the device did not finish.
 const UNFINISHED: f32 = -2e30;
@@ -274,24 +272,16 @@ impl Traverse {
         };
         let [w, h] = view.size();
         let fan = view.fan(geometry.centre, geometry.scale, NEAR_EYE);
-        let planes: Vec<[f32; 4]> = view
-            .clipping_planes()
-            .iter()
-            .map(|p| {
-                let normal = (p.normal / p.normal.abs().max_element()).normalize();
-                let offset = normal.dot((geometry.centre - p.origin) * geometry.scale);
-                normal.extend(offset).as_vec4().to_array()
-            })
-            .collect();
-        let ends = ends(view, &fan, geometry.scale);
+        let planes = rays::planes(view, geometry, DVec3::ZERO);
+        let ends = rays::ends(view, &fan, geometry.scale, true);
         let frame = Frame {
-            origin: arrays::affine(fan.by_pixel(fan.origin, [w, h])),
-            direction: arrays::affine(fan.by_pixel(fan.direction, [w, h])),
+            origin: rays::affine(fan.by_pixel(fan.origin, [w, h])),
+            direction: rays::affine(fan.by_pixel(fan.direction, [w, h])),
             size: [w, h],
             first_row: 0,
             rows: 0,
-            near: (fan.near as f32).clamp(-FAR, FAR),
-            far: (fan.far as f32).clamp(-FAR, FAR),
+            near: rays::limit(fan.near),
+            far: rays::limit(fan.far),
             planes: planes.len() as u32,
             has_ends: u32::from(!ends.is_empty()),
             leaves: geometry.boundary.boxes().len().div_ceil(2) as u32,
@@ -429,21 +419,6 @@ fn program(variant: &Variant, association: &str, blend: Blend, table: Option<&Lo
     text += &table::constants(table, false);
     text += &table::declarations(2, 0);
     [&text, shader::CELL, shader::INTEGRAL, TABLE, TRAVERSE].join("\n")
-}
-
-/// Where a depth buffer ends each pixel's ray, as the shader counts t; empty without one.
-fn ends(view: &View, fan: &Fan, scale: f64) -> Vec<f32> {
-    if !view.has_depth() {
-        return vec![];
-    }
-    let [w, h] = view.size();
-    let pixels = 0..w as usize * h as usize;
-    let end = |p: usize| {
-        let ray = view.ray((p % w as usize) as u32, (p / w as usize) as u32);
-        let cos = ray.direction.dot(view.forward());
-        ((ray.t_max * scale * cos - fan.ahead) as f32).clamp(-FAR, FAR)
-    };
-    pixels.into_par_iter().map(end).collect()
 }
 
 /// Six times the volume of a tetrahedron.

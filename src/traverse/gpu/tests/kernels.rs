@@ -3,8 +3,8 @@
 use super::random::{Random, random_transfer};
 use crate::cell::{Face, Projected};
 use crate::field::{Kind, Normal};
-use crate::gpu::arrays::twice;
 use crate::gpu::function::{Function, Knot};
+use crate::gpu::rays::twice;
 use crate::gpu::testing::{gpu, validated};
 use crate::integral::Light;
 use crate::traverse::gpu::*;
