@@ -3,9 +3,9 @@
 //! `classify` finds them on devices that sort, in the same way. Devices in software look up each corner of each cell for
 //! itself, lane by lane; here, what is needed of a point is found once.
 
-use super::Order;
 use super::frame::{GROWTH, Seen};
-use super::lines::{self, BINS};
+use super::lines::{self, BINS, Lines};
+use super::{Fragments, Order, Switches};
 use crate::geometry::{Cell, Geometry, Values};
 use crate::gpu::rays::FAR;
 use crate::order::MOST_PARTS;
@@ -25,6 +25,16 @@ pub(super) enum Parts {
     OfLines(u32),
     /// Those around the eye, in three.
     AroundEye,
+}
+
+impl Parts {
+    pub(super) fn new(switches: &Switches, lines: Lines) -> Self {
+        match (switches.fragments, lines) {
+            (Fragments::Intersected, Lines::All { count, .. }) => Parts::OfLines(count as u32),
+            (Fragments::Intersected, _) => Parts::None,
+            _ => Parts::AroundEye,
+        }
+    }
 }
 
 /// What keys need of a point.

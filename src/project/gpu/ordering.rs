@@ -10,22 +10,12 @@ use crate::order::depth::{self, HIDDEN};
 use crate::project::frame::{Frame, Seen};
 use crate::project::keys::{self, Parts};
 use crate::project::lines::Lines;
-use crate::project::{Fragments, Order, Switches};
+use crate::project::{Order, Switches};
 use rayon::prelude::*;
 use wgpu::BufferUsages as Usage;
 
 /// Entries of one buffer of the order, a multiple of [`BATCH`].
 pub(super) const ORDER_CHUNK: usize = BATCH << 6;
-
-impl Parts {
-    fn new(switches: &Switches, lines: Lines) -> Self {
-        match (switches.fragments, lines) {
-            (Fragments::Intersected, Lines::All { count, .. }) => Parts::OfLines(count as u32),
-            (Fragments::Intersected, _) => Parts::None,
-            _ => Parts::AroundEye,
-        }
-    }
-}
 
 /// The order of a frame, and what it holds for.
 pub(super) struct Ordered {
