@@ -159,7 +159,7 @@ impl Session {
         let moved = (matrix != DMat4::IDENTITY).then(|| self.renderer.install(|| transformed(points, matrix)));
         match moved {
             None => self.renderer.set_mesh(mesh, tetrahedra),
-            Some(moved) if self.mirrored => self.renderer.load(&moved, mesh.cells().len(), tetrahedra),
+            Some(moved) if self.mirrored => self.renderer.load(&moved, mesh.cells().len(), tetrahedra, &|_| {}),
             Some(moved) => {
                 self.renderer.set_mesh(mesh, tetrahedra);
                 // Points that are not finite belong to no cell that is drawn.

@@ -8,10 +8,10 @@ mod vtu;
 
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
+use crate::progress::Progress;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
-use std::sync::{Mutex, PoisonError};
 
 /// What Halite knows of but does not read: extension, type attribute of the XML file, and what would help.
 const REFUSED: [(&str, &str, &str); 24] = [
@@ -95,20 +95,4 @@ fn validated(path: &Path, mesh: Result<Mesh>) -> Result<Mesh> {
         Error::Mesh(what) => Error::malformed(path, what),
         other => other,
     })
-}
-
-/// Counts the numbers that are read, and tells their share.
-struct Progress<'a> {
-    tell: &'a (dyn Fn(f64) + Sync),
-    expected: f64,
-    /// Told under the lock, so that the share never falls.
-    done: Mutex<usize>,
-}
-
-impl Progress<'_> {
-    fn add(&self, numbers: usize) {
-        let mut done = self.done.lock().unwrap_or_else(PoisonError::into_inner);
-        *done += numbers;
-        (self.tell)((*done as f64 / self.expected).min(1.0));
-    }
 }

@@ -28,6 +28,7 @@ pub mod integral;
 pub mod io;
 pub mod mesh;
 pub mod order;
+mod progress;
 pub mod project;
 pub mod real;
 pub mod reference;

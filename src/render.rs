@@ -236,11 +236,23 @@ impl Renderer {
 
     /// Draws another mesh from now on, split into `tetrahedra`; the field must be set again.
     pub fn set_mesh(&mut self, mesh: &Mesh, tetrahedra: Tetrahedra) {
-        self.load(mesh.points(), mesh.cells().len(), tetrahedra);
+        self.set_mesh_with_progress(mesh, tetrahedra, &|_| {});
     }
 
-    /// As [`Self::set_mesh`], of a mesh of so many `cells` and these points.
-    pub(crate) fn load(&mut self, points: &[DVec3], cells: usize, tetrahedra: Tetrahedra) {
+    /// As [`Self::set_mesh`]; `report` is called, on any thread, with the share of the work that is done: from 0 to 1,
+    /// never falling.
+    pub fn set_mesh_with_progress(&mut self, mesh: &Mesh, tetrahedra: Tetrahedra, report: &(dyn Fn(f64) + Sync)) {
+        self.load(mesh.points(), mesh.cells().len(), tetrahedra, report);
+    }
+
+    /// As [`Self::set_mesh_with_progress`], of a mesh of so many `cells` and these points.
+    pub(crate) fn load(
+        &mut self,
+        points: &[DVec3],
+        cells: usize,
+        tetrahedra: Tetrahedra,
+        report: &(dyn Fn(f64) + Sync),
+    ) {
         let start = Instant::now();
         // Projected cells need no neighbours.
         let connected = self.project.is_none();
@@ -249,9 +261,11 @@ impl Renderer {
             if !connected {
                 return Geometry::unconnected(&points, &tetrahedra);
             }
-            let faces = Faces::new(&points, &tetrahedra.corners);
+            // Laying the mesh out takes about as long as matching its faces.
+            let faces = Faces::with_progress(&points, &tetrahedra.corners, &|share| report(share / 2.0));
             Geometry::new(&points, &tetrahedra, &faces)
         });
+        report(1.0);
         self.stats.faces_ms = ms(start);
         self.stats.cells = cells as u64;
         self.stats.tetrahedra = tetrahedra.corners.len() as u64;

@@ -16,7 +16,6 @@ use grid::Grid;
 use head::{Head, Piece};
 use std::fs::File;
 use std::path::Path;
-use std::sync::Mutex;
 
 /// Reads the unstructured grid in a VTK XML file, or in the files that it lists.
 pub(super) fn read(path: &Path, tell: &(dyn Fn(f64) + Sync)) -> Result<Mesh> {
@@ -49,6 +48,6 @@ pub(super) fn read(path: &Path, tell: &(dyn Fn(f64) + Sync)) -> Result<Mesh> {
         stores.push(file.store);
     }
     let expected = pieces.iter().map(Piece::expected).sum::<f64>().max(1.0);
-    let progress = Progress { tell, expected, done: Mutex::new(0) };
+    let progress = Progress::new(tell, expected);
     Grid { path, stores, pieces, progress }.mesh()
 }

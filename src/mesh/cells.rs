@@ -19,6 +19,7 @@ pub use types::{dimension, name};
 
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
+use crate::progress::Progress;
 use glam::DVec3;
 use polyhedron::Cut;
 use rayon::prelude::*;
@@ -153,11 +154,27 @@ impl Tetrahedra {
     /// [`Error::Empty`] if no 3D cell is left to draw; [`Error::Mesh`] if a cell has not the number of points that its
     /// type demands, or if there would be more than [`MAX_TETRAHEDRA`], or 2³² points.
     pub fn new(mesh: &Mesh) -> Result<Self> {
+        Self::with_progress(mesh, &|_| {})
+    }
+
+    /// As [`Tetrahedra::new`]; `report` is called, on any thread, with the share of the work that is done: from 0 to 1,
+    /// never falling.
+    ///
+    /// # Errors
+    /// Likewise.
+    pub fn with_progress(mesh: &Mesh, report: &(dyn Fn(f64) + Sync)) -> Result<Self> {
+        report(0.0);
         let splitter = Splitter::new(mesh);
         let n = mesh.cells().len();
+        // Each chunk is gone through twice.
+        let progress = Progress::new(report, 2.0 * n.div_ceil(CHUNK) as f64);
         let counts: Vec<Count> = (0..n.div_ceil(CHUNK))
             .into_par_iter()
-            .map_init(Cut::default, |cut, i| splitter.count(chunk(i, n), cut))
+            .map_init(Cut::default, |cut, i| {
+                let count = splitter.count(chunk(i, n), cut);
+                progress.add(1);
+                count
+            })
             .collect::<Result<_>>()?;
         let skipped = counts.iter().fold(Skipped::default(), |all, count| all.merge(count.skipped.clone()));
         let counted: Vec<usize> = counts.iter().map(|count| count.tetrahedra).collect();
@@ -189,7 +206,11 @@ impl Tetrahedra {
                 split_by(&mut cell, &counted)
             })
             .enumerate()
-            .map(|(i, (corners, cell))| splitter.fill(chunk(i, n), firsts[i], corners, cell))
+            .map(|(i, (corners, cell))| {
+                let part = splitter.fill(chunk(i, n), firsts[i], corners, cell);
+                progress.add(1);
+                part
+            })
             .collect();
         let mut added = Added { first: first as u32, ..Added::default() };
         for (part, _) in &parts {
