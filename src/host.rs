@@ -153,7 +153,7 @@ impl Session {
             }
             other => other?,
         };
-        tetrahedra.skipped.log();
+        tetrahedra.log();
         self.mirrored = matrix.determinant() < 0.0;
         let points = mesh.points();
         let moved = (matrix != DMat4::IDENTITY).then(|| self.renderer.install(|| transformed(points, matrix)));

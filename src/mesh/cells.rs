@@ -7,7 +7,7 @@
 //! that do not share point indices agree too; indices only break ties.
 //!
 //! Linear cells (`linear`) are split so; cells of higher order are, through all their nodes (`curved`), and polyhedra
-//! around a point in their middle (`polyhedron`). Both may add points to those of the mesh.
+//! around points inside (`polyhedron`). Both may add points to those of the mesh.
 
 mod curved;
 mod linear;
@@ -49,8 +49,45 @@ pub struct Tetrahedra {
     pub added: Added,
     /// The cells that were left out, by reason.
     pub skipped: Skipped,
-    /// Polyhedra with no point inside that sees all of their faces: some of their tetrahedra overlap.
-    pub crooked: usize,
+    /// Polyhedra whose surface crosses itself: some of their tetrahedra overlap.
+    pub crooked: Listed,
+}
+
+/// Cells that have something in common.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Listed {
+    /// How many there are.
+    pub count: usize,
+    /// The first of them, at most [`Listed::MOST`], ascending.
+    pub first: Vec<usize>,
+}
+
+impl Listed {
+    /// So many cells are named.
+    pub const MOST: usize = 3;
+
+    fn add(&mut self, cell: usize) {
+        self.count += 1;
+        if self.first.len() < Self::MOST {
+            self.first.push(cell);
+        }
+    }
+
+    fn merge(&mut self, other: &Self) {
+        self.count += other.count;
+        self.first.extend(&other.first);
+        self.first.truncate(Self::MOST);
+    }
+}
+
+/// The cells that are named: "cell 7", "cells 7, 8, 9 and more".
+impl std::fmt::Display for Listed {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let names: Vec<String> = self.first.iter().map(usize::to_string).collect();
+        let (s, more) =
+            (if self.count == 1 { "" } else { "s" }, if self.count > names.len() { " and more" } else { "" });
+        write!(f, "cell{s} {}{more}", names.join(", "))
+    }
 }
 
 /// Points that a split added, each the weighted mean of points of the mesh. Values at points are made likewise.
@@ -108,21 +145,36 @@ pub struct Skipped {
     pub invisible: usize,
     /// Polyhedra without a face of three points or more.
     pub empty: usize,
+    /// Polyhedra whose faces do not close a surface.
+    pub open: Listed,
+    /// Polyhedra with faces, but without volume.
+    pub flat: Listed,
 }
 
 impl Skipped {
     /// The number of cells left out for any reason.
     pub fn total(&self) -> usize {
-        self.lower_dimensional + self.unsupported.values().sum::<usize>() + self.ghost + self.invisible + self.empty
+        let polyhedra = self.empty + self.open.count + self.flat.count;
+        self.lower_dimensional + self.unsupported.values().sum::<usize>() + self.ghost + self.invisible + polyhedra
     }
 
     /// Tells the log: what might be missed as a warning.
-    pub fn log(&self) {
+    fn log(&self) {
         for (&kind, count) in &self.unsupported {
             tracing::warn!("{count} cells are left out: {} is not drawn yet", name(kind));
         }
         if self.invisible > 0 {
             tracing::warn!("{} cells are left out: they have a point that is not finite", self.invisible);
+        }
+        if self.open.count > 0 {
+            let (count, cells) = (self.open.count, &self.open);
+            tracing::warn!(
+                "{count} cells are left out: they are polyhedra whose faces do not close a surface ({cells})"
+            );
+        }
+        if self.flat.count > 0 {
+            let (count, cells) = (self.flat.count, &self.flat);
+            tracing::warn!("{count} cells are left out: they are polyhedra without volume ({cells})");
         }
         if self.lower_dimensional > 0 {
             tracing::info!("{} cells are left out: they have no volume (2D or less)", self.lower_dimensional);
@@ -140,6 +192,8 @@ impl Skipped {
         self.ghost += other.ghost;
         self.invisible += other.invisible;
         self.empty += other.empty;
+        self.open.merge(&other.open);
+        self.flat.merge(&other.flat);
         for (t, n) in other.unsupported {
             *self.unsupported.entry(t).or_default() += n;
         }
@@ -168,7 +222,7 @@ impl Tetrahedra {
         let n = mesh.cells().len();
         // Each chunk is gone through twice.
         let progress = Progress::new(report, 2.0 * n.div_ceil(CHUNK) as f64);
-        let counts: Vec<Count> = (0..n.div_ceil(CHUNK))
+        let mut counts: Vec<Count> = (0..n.div_ceil(CHUNK))
             .into_par_iter()
             .map_init(Cut::default, |cut, i| {
                 let count = splitter.count(chunk(i, n), cut);
@@ -195,10 +249,11 @@ impl Tetrahedra {
             Some((*at - count.added) as u32)
         });
         let firsts: Vec<u32> = firsts.collect();
+        let solved: Vec<_> = counts.iter_mut().map(|count| std::mem::take(&mut count.solved)).collect();
         let mut corners = vec![[0; 4]; total];
         let one_to_one = skipped.total() == 0 && mesh.cells().types.par_iter().all(|&t| t == 10);
         let mut cell = if one_to_one { Vec::new() } else { vec![0; total] };
-        let parts: Vec<(Added, usize)> = split_by(&mut corners, &counted)
+        let parts: Vec<(Added, Listed)> = split_by(&mut corners, &counted)
             .into_par_iter()
             .zip(if one_to_one {
                 counts.iter().map(|_| <&mut [u32]>::default()).collect()
@@ -207,7 +262,7 @@ impl Tetrahedra {
             })
             .enumerate()
             .map(|(i, (corners, cell))| {
-                let part = splitter.fill(chunk(i, n), firsts[i], corners, cell);
+                let part = splitter.fill(chunk(i, n), &solved[i], firsts[i], corners, cell);
                 progress.add(1);
                 part
             })
@@ -219,9 +274,19 @@ impl Tetrahedra {
             added.sources.extend_from_slice(&part.sources);
             added.weights.extend_from_slice(&part.weights);
         }
-        let crooked = parts.iter().map(|part| part.1).sum();
+        let mut crooked = Listed::default();
+        parts.iter().for_each(|part| crooked.merge(&part.1));
         let cells = n - skipped.total();
         Ok(Tetrahedra { corners, cell: (!one_to_one).then_some(cell), cells, added, skipped, crooked })
+    }
+
+    /// Tells the log what is left out, and what cannot be drawn right.
+    pub fn log(&self) {
+        self.skipped.log();
+        if self.crooked.count > 0 {
+            let (count, cells) = (self.crooked.count, &self.crooked);
+            tracing::warn!("{count} cells are drawn with overlaps: they are polyhedra that cross themselves ({cells})");
+        }
     }
 
     /// The points that [`Tetrahedra::corners`] index: those of the mesh, and after them those that the split added.
@@ -292,6 +357,8 @@ fn nothing_left(mesh: &Mesh, skipped: &Skipped) -> String {
         (skipped.ghost, "ghosts or hidden"),
         (skipped.invisible, "with points that are NaN or infinite"),
         (skipped.empty, "polyhedra without faces"),
+        (skipped.open.count, "polyhedra whose faces do not close a surface"),
+        (skipped.flat.count, "polyhedra without volume"),
     ]
     .into_iter()
     .filter(|(n, _)| *n > 0)

@@ -7,6 +7,7 @@ mod common;
 mod kinds;
 mod nodes;
 mod polyhedra;
+mod solids;
 
 use common::draw;
 use glam::{DMat3, DVec3, dvec3};

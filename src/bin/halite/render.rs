@@ -156,7 +156,7 @@ pub(crate) fn prepare(options: &Request, given: Option<Scene>) -> Result<Job> {
     let start = Instant::now();
     let tetrahedra = Tetrahedra::new(&mesh).with_context(|| path.display().to_string())?;
     let split_ms = ms(start);
-    tetrahedra.skipped.log();
+    tetrahedra.log();
 
     let scalars = options.scalars(given.as_ref(), &mesh)?;
     let field = scalars.field(&mesh).with_context(|| path.display().to_string())?;
