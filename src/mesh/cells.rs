@@ -159,7 +159,7 @@ impl Skipped {
     }
 
     /// Tells the log: what might be missed as a warning.
-    fn log(&self) {
+    pub fn log(&self) {
         for (&kind, count) in &self.unsupported {
             tracing::warn!("{count} cells are left out: {} is not drawn yet", name(kind));
         }

@@ -58,7 +58,7 @@ fn check(what: &str, mesh: &Mesh, outer: &[Vec<DVec3>], volume: Option<f64>) -> 
     corners.iter().enumerate().for_each(|(i, c)| {
         c.iter().for_each(|p| {
             by_point.entry(*p).or_default().insert(i);
-        })
+        });
     });
     let mut areas = vec![DVec3::ZERO; outer.len()];
     let mut counts = vec![0; outer.len()];

@@ -6,6 +6,9 @@ use std::cmp::Ordering;
 /// The best cut takes the third power of the corners' number; beyond so many, ears are cut off instead.
 const MOST_CORNERS: usize = 64;
 
+/// Ears take the second power; a face of more corners, which no writer makes, is a fan.
+const MOST_EARS: usize = 1 << 13;
+
 /// A triangle below this quality counts as turned over.
 const FLAT: f64 = 1e-9;
 
@@ -99,6 +102,9 @@ impl Scratch {
             let own = from(0);
             let other = own.is_nan() || own > FLAT || own >= from(1);
             return self.triangles.extend(if other { [[0, 1, 2], [0, 2, 3]] } else { [[1, 2, 3], [0, 1, 3]] });
+        }
+        if n > MOST_EARS {
+            return self.triangles.extend((2..n).map(|i| [0, i - 1, i]));
         }
         if n > MOST_CORNERS {
             return self.ears(normal);

@@ -23,6 +23,9 @@ const SHAPELY: f64 = 0.02;
 /// Rounds in which added points are taken away.
 const ROUNDS: usize = 4;
 
+/// A flat part of the surface: the triangle of the polyhedron that it is in, and its own.
+type Flat = (u32, Vec<[u32; 3]>);
+
 /// Tetrahedra, positive all, and the surface that they fill.
 #[derive(Debug)]
 pub(super) struct Filling {
@@ -100,10 +103,10 @@ impl Filling {
             let triangles = cut_polygon(polygon.iter().map(|p| self.place(*p)));
             (*parent, triangles.into_iter().map(|t| t.map(|i| polygon[i])).collect::<Vec<_>>())
         });
-        let best: Vec<(u32, Vec<[u32; 3]>)> = best.collect();
+        let best: Vec<Flat> = best.collect();
         // Around a corner of the hole, if that is well behind all of its faces.
         let corners: BTreeSet<u32> = link.iter().flatten().copied().collect();
-        let mut found: Option<(f64, u32, Vec<(u32, Vec<[u32; 3]>)>)> = None;
+        let mut found: Option<(f64, u32, Vec<Flat>)> = None;
         for v in corners {
             let cut = polygons.iter().zip(&best).map(|((parent, polygon), best)| {
                 let Some(k) = polygon.iter().position(|p| *p == v) else { return best.clone() };
@@ -111,7 +114,7 @@ impl Filling {
                 let fan = (1..n - 1).map(|i| [v, polygon[(k + i) % n], polygon[(k + i + 1) % n]]);
                 (*parent, fan.collect())
             });
-            let cut: Vec<(u32, Vec<[u32; 3]>)> = cut.collect();
+            let cut: Vec<Flat> = cut.collect();
             let normal = |t: &[u32; 3]| Plane::of(self.at(t)).map_or(DVec3::ZERO, |p| p.normal);
             let turns = cut.iter().zip(&best).all(|((_, fan), (_, best))| {
                 best.first().is_some_and(|first| fan.iter().all(|t| normal(t).dot(normal(first)) > 0.5))

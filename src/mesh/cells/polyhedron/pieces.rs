@@ -24,6 +24,9 @@ const DEEP_ENOUGH: f64 = 0.05;
 /// Notched edges that planes are laid through, the sharpest first.
 const MOST_NOTCHES: usize = 24;
 
+/// Pieces times triangles of the surface; beyond that it would take minutes.
+const MOST_WORK: usize = 4_000_000;
+
 /// Planes that are tried in turn, the best first.
 const MOST_PLANES: usize = 6;
 
@@ -57,7 +60,7 @@ impl Pieces {
         let triangles: Vec<Triangle> = surface.iter().enumerate().map(triangle).collect();
         let mut all = Pieces { places: places.to_vec(), triangles, pieces: 1 };
         let mut waiting = all.parts(0)?;
-        let most = 64 + 2 * surface.len();
+        let most = (64 + 2 * surface.len()).min(MOST_WORK / surface.len());
         let mut done = vec![];
         while let Some(piece) = waiting.pop() {
             let faces = all.surface(piece);

@@ -8,6 +8,9 @@ use std::collections::{HashMap, HashSet};
 /// it. The polyhedron reaches about 1 from the origin.
 const NEAR: f64 = 1e-9;
 
+/// Points beside which one that is near is looked for, and edges that are open: more of them are no slip.
+const MOST_NEAR: usize = 1 << 10;
+
 /// What is wrong with a polyhedron.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Fault {
@@ -58,8 +61,7 @@ pub(super) fn close(places: &[DVec3], triangles: &[[u32; 3]]) -> Result<Vec<[u32
     let mut weld: Vec<u32> = vec![];
     for try_near in [false, true] {
         if try_near {
-            let same = |p: &DVec3| places.iter().position(|q| q.distance_squared(*p) < NEAR * NEAR).unwrap_or(0) as u32;
-            weld = places.iter().map(same).collect();
+            weld = near(places);
         }
         let welded: Vec<[u32; 3]> = triangles
             .iter()
@@ -86,6 +88,22 @@ pub(super) fn close(places: &[DVec3], triangles: &[[u32; 3]]) -> Result<Vec<[u32
     Err(fault)
 }
 
+/// For each place the first of those near it.
+fn near(places: &[DVec3]) -> Vec<u32> {
+    let mut order: Vec<u32> = (0..places.len() as u32).collect();
+    order.sort_by(|a, b| places[*a as usize].x.total_cmp(&places[*b as usize].x));
+    let mut weld: Vec<u32> = (0..places.len() as u32).collect();
+    for (i, &p) in order.iter().enumerate() {
+        let close = order[..i].iter().rev().take_while(|q| places[p as usize].x - places[**q as usize].x < NEAR);
+        let same =
+            close.take(MOST_NEAR).find(|q| places[**q as usize].distance_squared(places[p as usize]) < NEAR * NEAR);
+        if let Some(q) = same {
+            weld[p as usize] = weld[*q as usize];
+        }
+    }
+    weld
+}
+
 fn sorted(mut t: [u32; 3]) -> [u32; 3] {
     t.sort_unstable();
     t
@@ -110,6 +128,9 @@ fn complete(places: &[DVec3], mut triangles: Vec<[u32; 3]>) -> Vec<[u32; 3]> {
     for _ in 0..3 {
         let mut open: Vec<(u32, u32, usize)> =
             edges(&triangles).into_iter().filter(|(_, t)| t.len() == 1).map(|((a, b), t)| (a, b, t[0].0)).collect();
+        if open.len() > MOST_NEAR {
+            break;
+        }
         open.sort_unstable();
         let ends: HashSet<u32> = open.iter().flat_map(|e| [e.0, e.1]).collect();
         let mut mended: HashSet<usize> = HashSet::new();
