@@ -9,10 +9,13 @@
 //! }
 //! ```
 
+pub mod automatic;
 mod file;
 mod opaque;
+mod reader;
 
 pub use opaque::Opaque;
+pub use reader::read;
 
 use crate::error::{Error, Result};
 use crate::field::{Association, Component, Field};
@@ -105,18 +108,15 @@ impl Scene {
     /// Reads a scene, and its depth image if it has one; the mesh is not opened.
     ///
     /// # Errors
-    /// [`Error::File`]; [`Error::Malformed`], which names the key; [`Error::Unsupported`] for bivariate widgets.
+    /// [`Error::File`]; [`Error::Malformed`], which names the key, or the line and column; [`Error::Unsupported`] for bivariate widgets.
     pub fn open(path: &Path) -> Result<Self> {
         let text = std::fs::read(path).map_err(|e| Error::file(path, e))?;
-        let mut json = serde_json::Deserializer::from_slice(&text);
-        let file: file::File = serde_path_to_error::deserialize(&mut json).map_err(|e| {
-            let key = e.path().to_string();
-            let what = e.into_inner().to_string();
-            Error::malformed(path, if key == "." { what } else { format!("{key}: {what}") })
-        })?;
-        json.end().map_err(|e| Error::malformed(path, format!("after the scene: {e}")))?;
-        let value: Value = serde_json::from_slice(&text).map_err(|e| Error::malformed(path, e.to_string()))?;
-        file::check(&value).map_err(|what| Error::malformed(path, what))?;
+        let malformed = |what| Error::malformed(path, what);
+        let value = reader::parse(&text).map_err(malformed)?;
+        if !value.is_object() {
+            return Err(malformed("a scene is an object: {\"mesh\": ...}".into()));
+        }
+        let file: file::File = read(&value).map_err(malformed)?;
         file.scene(path)
     }
 

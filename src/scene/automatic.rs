@@ -1,0 +1,177 @@
+//! What is drawn when nobody says: an array, a range, colours, opacities and a view that show something of any mesh.
+
+mod framing;
+mod look;
+
+pub use framing::{camera, framed};
+
+use super::{Scalars, Scene};
+use crate::error::{Error, Result};
+use crate::field::{Association, Component, Field};
+use crate::mesh::{Array, Mesh, Values, cells::Tetrahedra};
+use crate::transfer::Axis;
+use crate::transfer::colormap::ColorMap;
+use crate::view::{Blend, Camera};
+use std::path::PathBuf;
+
+/// Behind the volume: dark, but not so that black parts of it vanish.
+const BACKGROUND: [f64; 3] = [0.11, 0.12, 0.14];
+
+/// Width and height of pictures, in pixels.
+pub const SIZE: [u32; 2] = [1024, 768];
+
+/// What a mesh without arrays is drawn in.
+const SOLID: [f64; 3] = [0.78, 0.82, 0.88];
+
+/// Arrays that hold names of things, not values (lower case).
+const NOT_VALUES: [&str; 13] = [
+    "vtkoriginalpointids",
+    "vtkoriginalcellids",
+    "globalnodeid",
+    "globalelementid",
+    "globalids",
+    "pedigreenodeid",
+    "pedigreeelementid",
+    "objectid",
+    "vtkghosttype",
+    "vtkghostlevels",
+    "vtkvalidpointmask",
+    "processid",
+    "partitionid",
+];
+
+/// What of the look somebody did say.
+#[derive(Debug, Clone, Default)]
+pub struct Wishes {
+    /// The scalars that colours and opacities range over.
+    pub range: Option<[f64; 2]>,
+    /// The colours.
+    pub map: Option<ColorMap>,
+    /// The opacities.
+    pub opacity: Option<Opacity>,
+    /// The length that opacities are meant for, in world units.
+    pub unit_distance: Option<f64>,
+    /// Whether colours and opacities are even over the logarithm of the scalars.
+    pub logarithmic: bool,
+    /// How the values along a ray become a pixel.
+    pub blend: Blend,
+    /// Width and height of the picture; [`SIZE`] if nobody says.
+    pub size: Option<[u32; 2]>,
+    /// From where the mesh is seen; [`camera`] if nobody says.
+    pub camera: Option<Camera>,
+}
+
+/// Where a knot of an opacity function is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Place {
+    /// At a scalar.
+    Scalar(f64),
+    /// At this share of the range: 0 is its start, 1 its end.
+    Share(f64),
+}
+
+/// An opacity function whose knots may move with the range of scalars.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Opacity(pub Vec<(Place, f64)>);
+
+impl Opacity {
+    /// Its knots, scalar and opacity, for a range of scalars.
+    pub fn over(&self, [lo, hi]: [f64; 2]) -> Vec<(f64, f64)> {
+        let at = |place| match place {
+            Place::Scalar(s) => s,
+            Place::Share(share) => lo + (hi - lo) * share,
+        };
+        self.0.iter().map(|&(place, a)| (at(place), a)).collect()
+    }
+
+    /// Its knots on `axis`, within the share `tolerance` of its largest opacity.
+    pub fn on(&self, axis: &Axis, tolerance: f64) -> Vec<(f64, f64)> {
+        if !axis.is_logarithmic() {
+            return self.over(axis.range());
+        }
+        let at = |place| match place {
+            Place::Scalar(s) => axis.place(s),
+            Place::Share(share) => share,
+        };
+        let knots: Vec<(f64, f64)> = self.0.iter().map(|&(place, a)| (at(place), a)).collect();
+        axis.knots(&knots, tolerance * look::largest(&knots))
+    }
+}
+
+/// Whether an array, by its name, counts or marks things.
+fn is_id(name: &str) -> bool {
+    let name = name.to_lowercase();
+    NOT_VALUES.contains(&name.as_str()) || ["_id", "_ids", " id", " ids"].iter().any(|end| name.ends_with(end))
+}
+
+fn varies(array: &Array) -> bool {
+    let mut finite = (0..array.values.len()).map(|i| array.values.get(i)).filter(|v| v.is_finite());
+    let first = finite.next();
+    finite.any(|v| Some(v) != first)
+}
+
+/// The array that says most: real numbers before integers, points before cells, scalars before vectors.
+///
+/// # Errors
+/// [`Error::Field`] if there is no array.
+pub fn scalars(mesh: &Mesh, of: Option<Association>) -> Result<Scalars> {
+    let points = mesh.point_arrays().iter().map(|a| (Association::Point, a));
+    let cells = mesh.cell_arrays().iter().map(|a| (Association::Cell, a));
+    let all = points.chain(cells).filter(|(a, _)| of.is_none_or(|of| of == *a));
+    let best = all.min_by_key(|(association, a)| {
+        let integer = !matches!(a.values, Values::F32(_) | Values::F64(_));
+        (is_id(&a.name), !varies(a), integer, *association == Association::Cell, a.components > 1)
+    });
+    let Some((association, array)) = best else {
+        let of = match of {
+            Some(Association::Point) => "points",
+            Some(Association::Cell) => "cells",
+            None => "points or cells",
+        };
+        return Err(Error::Field(format!("it has no array of {of}, so no values to draw")));
+    };
+    let component = if array.components > 1 { Component::Magnitude } else { Component::Index(0) };
+    Ok(Scalars { name: array.name.clone(), association: Some(association), component: Some(component) })
+}
+
+/// What a mesh without arrays is drawn as: one value everywhere, for a colour map of one colour.
+///
+/// # Errors
+/// [`Error::Field`] if there is no cell.
+pub fn solid(mesh: &Mesh) -> Result<(Field, ColorMap)> {
+    let field = Field::from_slice("", &vec![0_u8; mesh.cells().len()], 1, Association::Cell, Component::Index(0))?;
+    Ok((field, ColorMap::solid(SOLID)))
+}
+
+/// A scene that shows `field`, which `scalars` are in `mesh`.
+///
+/// # Errors
+/// [`Error::Transfer`] if what was wished for is no transfer function, or there is no logarithm of the range.
+pub fn scene(
+    mesh: &Mesh,
+    tetrahedra: &Tetrahedra,
+    scalars: Scalars,
+    field: &Field,
+    wishes: Wishes,
+) -> Result<Scene> {
+    let size = wishes.size.unwrap_or(SIZE);
+    let camera = wishes.camera.unwrap_or_else(|| camera(mesh, tetrahedra, size));
+    Ok(Scene {
+        mesh: PathBuf::new(),
+        transfer: look::transfer(mesh, tetrahedra, &scalars.name, field, camera, &wishes)?,
+        scalars,
+        camera,
+        size,
+        pixel_offset: Default::default(),
+        clipping_range: None,
+        clipping_planes: Vec::new(),
+        opaque: Vec::new(),
+        depth: None,
+        blend: wishes.blend,
+        background: Some(BACKGROUND),
+        engine: None,
+        device: None,
+        integral: None,
+        projection: None,
+    })
+}
