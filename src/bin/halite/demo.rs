@@ -1,5 +1,5 @@
-use crate::render::{self, Job};
 use crate::output;
+use crate::render::{self, Job};
 use anyhow::Result;
 use clap::Args;
 use halite::mesh::{cells::Tetrahedra, generate};
