@@ -11,6 +11,7 @@
 
 pub mod automatic;
 mod file;
+pub mod missing;
 mod opaque;
 mod reader;
 

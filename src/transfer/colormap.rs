@@ -272,7 +272,6 @@ mod tests {
         close(color(&ColorMap::named("grey_r").unwrap(), 0.3), [0.7; 3], 1e-12);
         let message = ColorMap::named("bone").unwrap_err().to_string();
         assert!(message.contains("bone") && message.contains("viridis"), "{message}");
-        assert!(named::NAMES.iter().all(|name| NAMES.contains(name)));
         for name in NAMES {
             let (map, turned) = (ColorMap::named(name).unwrap(), ColorMap::named(&format!("{name}_r")).unwrap());
             for x in [0.0, 0.11, 0.4, 0.77, 1.0] {

@@ -9,9 +9,6 @@
 /// A knot `[place, red, green, blue]`; the last knot's place is the length of the map.
 type Knot = [f64; 4];
 
-/// The names that [`table`] knows.
-pub(super) const NAMES: [&str; 8] = ["viridis", "plasma", "inferno", "magma", "cividis", "turbo", "twilight", "jet"];
-
 /// The knots of a map over [0, 1], if there is one of this name.
 pub(super) fn table(name: &str) -> Option<Vec<(f64, [f64; 3])>> {
     let knots: &[Knot] = match name {
