@@ -20,6 +20,7 @@ pub use reader::read;
 
 use crate::error::{Error, Result};
 use crate::field::{Association, Component, Field};
+use crate::memory;
 use crate::mesh::Mesh;
 use crate::transfer::TransferFunction;
 use crate::view::{Blend, Camera, ClippingPlane, DepthBuffer, DepthKind, View};
@@ -145,6 +146,8 @@ impl Scene {
         }
         let behind = self.background.unwrap_or_default().map(|c| c as f32);
         let [w, h] = self.size;
+        let pixels = u64::from(w) * u64::from(h) * (size_of::<f64>() + size_of::<[f32; 3]>()) as u64;
+        memory::check(&format!("the opaque objects in {w}x{h} pixels"), pixels)?;
         let (mut values, mut backdrop) = (Vec::new(), Vec::new());
         for (j, i) in (0..h).flat_map(|j| (0..w).map(move |i| (j, i))) {
             let mut ray = view.ray(i, j);

@@ -147,13 +147,7 @@ pub fn solid(mesh: &Mesh) -> Result<(Field, ColorMap)> {
 ///
 /// # Errors
 /// [`Error::Transfer`] if what was wished for is no transfer function, or there is no logarithm of the range.
-pub fn scene(
-    mesh: &Mesh,
-    tetrahedra: &Tetrahedra,
-    scalars: Scalars,
-    field: &Field,
-    wishes: Wishes,
-) -> Result<Scene> {
+pub fn scene(mesh: &Mesh, tetrahedra: &Tetrahedra, scalars: Scalars, field: &Field, wishes: Wishes) -> Result<Scene> {
     let size = wishes.size.unwrap_or(SIZE);
     let camera = wishes.camera.unwrap_or_else(|| camera(mesh, tetrahedra, size));
     Ok(Scene {

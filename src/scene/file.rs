@@ -1,5 +1,6 @@
 //! A scene as its file has it: what may be written, and what is wrong with what was.
 
+use super::reader::kind;
 use super::{DepthImage, Opaque, Scalars, Scene};
 use crate::error::{Error, Result};
 use crate::field::{Association, Component};
@@ -243,7 +244,9 @@ impl File {
         if let Some(depth) = &self.depth {
             check_name("depth.file", &depth.file.to_string_lossy())?;
         }
-        for (key, name) in [("engine", self.engine.as_deref()), ("device", self.device.as_ref().and_then(Value::as_str))] {
+        for (key, name) in
+            [("engine", self.engine.as_deref()), ("device", self.device.as_ref().and_then(Value::as_str))]
+        {
             name.map_or(Ok(()), |name| check_name(key, name))?;
         }
         for (i, knot) in self.color.iter().flatten().enumerate() {
@@ -257,7 +260,7 @@ impl File {
         }
         match &self.integral {
             None | Some(Value::Object(_) | Value::String(_)) => Ok(()),
-            Some(_) => Err("integral: an object is meant, or the name of a form".into()),
+            Some(other) => Err(format!("integral: an object is meant, or the name of a form, and not {}", kind(other))),
         }
     }
 

@@ -177,7 +177,11 @@ mod tests {
                 assert_eq!((new.color_at(value), new.opacity_at(value)), (red, 0.7));
                 for &s in numbers.iter().filter(|v| v.is_finite()).chain(&[0.3, 0.95, -0.1, 1.1]) {
                     assert!((value - s).abs() > 0.1);
-                    assert_eq!((new.color_at(s), new.opacity_at(s)), (old.color_at(s), old.opacity_at(s)), "{s} {clamp}");
+                    assert_eq!(
+                        (new.color_at(s), new.opacity_at(s)),
+                        (old.color_at(s), old.opacity_at(s)),
+                        "{s} {clamp}"
+                    );
                 }
                 let most = beyond(&numbers, &old, blend, red, None).unwrap();
                 assert_eq!(most.1.opacity_at(most.0), 0.5);

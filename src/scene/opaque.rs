@@ -92,13 +92,21 @@ impl TryFrom<Written> for Opaque {
                 strange("plane", [("center", center.is_some()), ("radius", radius.is_some())])?;
                 let point = point.ok_or_else(|| missing("point"))?;
                 let normal = normal.ok_or_else(|| missing("normal"))?;
-                if normal == [0.0; 3] { Err("the normal is zero".into()) } else { Ok(Opaque::Plane { point, normal, color }) }
+                if normal == [0.0; 3] {
+                    Err("the normal is zero".into())
+                } else {
+                    Ok(Opaque::Plane { point, normal, color })
+                }
             }
             Kind::Sphere => {
                 strange("sphere", [("point", point.is_some()), ("normal", normal.is_some())])?;
                 let center = center.ok_or_else(|| missing("center"))?;
                 let radius = radius.ok_or_else(|| missing("radius"))?;
-                if radius > 0.0 { Ok(Opaque::Sphere { center, radius, color }) } else { Err("the radius is not above 0".into()) }
+                if radius > 0.0 {
+                    Ok(Opaque::Sphere { center, radius, color })
+                } else {
+                    Err("the radius is not above 0".into())
+                }
             }
         }
     }

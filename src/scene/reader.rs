@@ -2,8 +2,8 @@
 
 use serde::de::value::StrDeserializer;
 use serde::de::{
-    self, DeserializeOwned, DeserializeSeed, Deserializer, Error as _, Expected, IntoDeserializer, MapAccess, SeqAccess,
-    Unexpected, Visitor,
+    self, DeserializeOwned, DeserializeSeed, Deserializer, Error as _, Expected, IntoDeserializer, MapAccess,
+    SeqAccess, Unexpected, Visitor,
 };
 use serde_json::{Map, Value, error::Category};
 use std::fmt::{self, Display, Formatter};
@@ -38,7 +38,9 @@ fn at_place(error: &serde_json::Error) -> String {
         "expected `:`" => "there is no \":\" after the key",
         "expected `,` or `}`" => "there is no \",\" or \"}\" after the value",
         "expected `,` or `]`" => "there is no \",\" or \"]\" after the value",
-        "expected ident" => "this is no value; one is a text in double quotes, a number, true, false, a list or an object",
+        "expected ident" => {
+            "this is no value; one is a text in double quotes, a number, true, false, a list or an object"
+        }
         "key must be a string" => "a key is a text in double quotes",
         "trailing comma" => "there is a \",\" with nothing after it",
         "trailing characters" => "there is something after the scene",
@@ -218,7 +220,8 @@ fn found_words(found: Unexpected) -> String {
     }
 }
 
-fn kind(value: &Value) -> String {
+/// What a value is, in the words of scenes.
+pub(super) fn kind(value: &Value) -> String {
     match value {
         Value::Null => "null".into(),
         Value::Array(_) => "a list".into(),

@@ -55,7 +55,9 @@ impl Axis {
         if lo > 0.0 && lo < hi && hi.is_finite() {
             return Ok(Axis { range, logarithmic: true });
         }
-        Err(Error::Transfer(format!("there is no logarithmic scale from {lo} to {hi}: both ends are above 0 and ascend")))
+        Err(Error::Transfer(format!(
+            "there is no logarithmic scale from {lo} to {hi}: both ends are above 0 and ascend"
+        )))
     }
 
     /// The range of scalars.
@@ -100,7 +102,11 @@ impl Axis {
             if self.logarithmic && i > 0 {
                 let (from, first) = knots[i - 1];
                 let (length, rise) = ((self.range[1] / self.range[0]).ln() * (place - from), first.distance(value));
-                let pieces = (rise * length / (8.0 * tolerance.max(f64::MIN_POSITIVE))).max(0.0).sqrt().ceil().clamp(1.0, MOST_PIECES) as u32;
+                let pieces = (rise * length / (8.0 * tolerance.max(f64::MIN_POSITIVE)))
+                    .max(0.0)
+                    .sqrt()
+                    .ceil()
+                    .clamp(1.0, MOST_PIECES) as u32;
                 for k in 1..pieces {
                     let u = f64::from(k) / f64::from(pieces);
                     out.push((self.scalar(from + (place - from) * u), first.mix(value, u)));

@@ -34,7 +34,8 @@ impl Camera {
         let aspect = f64::from(size[0]) / f64::from(size[1]);
         let (wide, high) = (tan * aspect, tan);
         let none = [f64::NEG_INFINITY; 6];
-        let most = |a: [f64; 6], b: [f64; 6]| std::array::from_fn(|k| if b[k] > a[k] || b[k].is_nan() { b[k] } else { a[k] });
+        let most =
+            |a: [f64; 6], b: [f64; 6]| std::array::from_fn(|k| if b[k] > a[k] || b[k].is_nan() { b[k] } else { a[k] });
         let [left, rightmost, low, top, near, far] = points
             .into_par_iter()
             .map(|p| {
@@ -46,7 +47,8 @@ impl Camera {
         let reach = (-(left + rightmost) / (2.0 * wide)).min(-(low + top) / (2.0 * high));
         // Not in the points themselves, which may be one, or lie on a line that is looked along.
         let depth = near + far;
-        let apart = if depth > 0.0 { 1e-3 * depth } else { (1e-3 * (across.abs() + aloft.abs() + far.abs())).max(1e-3) };
+        let apart =
+            if depth > 0.0 { 1e-3 * depth } else { (1e-3 * (across.abs() + aloft.abs() + far.abs())).max(1e-3) };
         let back = reach.min(-near - apart);
         let position = right * across + up * aloft + forward * back;
         let focal_point = position + forward * ((far - near) / 2.0 - back);

@@ -63,7 +63,8 @@ impl Legend {
         let footer = if self.opacities { format!("opacity to {}", short(most)) } else { String::new() };
         let letters = numbers.iter().map(|n| n.1.chars().count()).max().unwrap_or(0);
         let (bar, plot) = (2 * cw, if self.opacities { 4 * cw } else { 0 });
-        let wide = (plot + bar + cw + letters * cw).max(cw * self.title.chars().count()).max(cw * footer.chars().count());
+        let wide =
+            (plot + bar + cw + letters * cw).max(cw * self.title.chars().count()).max(cw * footer.chars().count());
         let high = h * 6 / 10;
         let margin = cw;
         let [left, top] = [w.saturating_sub(wide + 3 * margin), h.saturating_sub(high) / 2];
@@ -108,7 +109,8 @@ fn numbers(axis: &Axis) -> Vec<(f64, String)> {
         let parts: &[f64] = if decades < 2.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
         let all = (first..=last).filter(|k| k % every == 0).flat_map(|k| parts.iter().map(move |p| p * 10_f64.powi(k)));
         let within = |s: &f64| *s >= lo * (1.0 - 1e-9) && *s <= hi * (1.0 + 1e-9);
-        let numbers: Vec<(f64, String)> = all.filter(within).map(|s| (axis.place(s).clamp(0.0, 1.0), short(s))).collect();
+        let numbers: Vec<(f64, String)> =
+            all.filter(within).map(|s| (axis.place(s).clamp(0.0, 1.0), short(s))).collect();
         if numbers.len() > 1 {
             return numbers;
         }

@@ -1,5 +1,6 @@
 //! The standalone program.
 
+mod allocator;
 mod bench;
 mod camera;
 mod demo;
@@ -44,6 +45,9 @@ enum Command {
     Tables(Box<tables::Options>),
     Demo(demo::Options),
 }
+
+#[global_allocator]
+static MEMORY: allocator::Ending = allocator::Ending;
 
 fn main() -> ExitCode {
     hush_mesa();

@@ -149,6 +149,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     let request = &options.request;
     let given = request.scene()?;
     let mut renderer = request.renderer(threads, given.as_ref(), request.device(given.as_ref()))?;
+    request.check_room(given.as_ref())?;
     let job = renderer.install(|| prepare(request, given))?;
     let background = job.scene.background;
     let legend = if options.legend { Some(job.legend()?) } else { None };
@@ -187,7 +188,8 @@ pub(crate) fn prepare(options: &Request, given: Option<Scene>) -> Result<Job> {
     }
     let load_ms = ms(start);
     let start = Instant::now();
-    let mut tetrahedra = Tetrahedra::new(&mesh).with_context(|| path.display().to_string())?;
+    let split = progress::busy("splitting", || Tetrahedra::new(&mesh));
+    let mut tetrahedra = split.with_context(|| path.display().to_string())?;
     let split_ms = ms(start);
     tetrahedra.skipped.log();
 
@@ -267,6 +269,14 @@ impl Request {
         let scene = Scene::open(&self.input)?;
         check_engine(&scene).with_context(|| self.input.display().to_string())?;
         Ok(Some(scene))
+    }
+
+    /// Refuses a picture that there is no memory for, before a mesh is read.
+    fn check_room(&self, scene: Option<&Scene>) -> Result<()> {
+        let [w, h] = self.size.or(scene.map(|s| s.size)).unwrap_or(automatic::SIZE);
+        // Beyond this, the view says what is wrong.
+        let pixels = u64::from(w) * u64::from(h);
+        Ok(halite::memory::check(&format!("a picture of {w}x{h} pixels"), pixels.min(1 << 28) * 16)?)
     }
 
     /// The device that was asked for.
@@ -415,7 +425,8 @@ pub(crate) struct Times {
 pub(crate) fn draw(job: Job, renderer: &mut Renderer) -> Result<Drawn> {
     let Job { mesh, tetrahedra, field, scene, load_ms, split_ms, .. } = job;
     let (view, behind) = scene.view()?;
-    renderer.set_mesh(&mesh, tetrahedra);
+    renderer.check_room(mesh.points().len(), &tetrahedra)?;
+    progress::busy("matching faces", || renderer.set_mesh(&mesh, tetrahedra));
     renderer.set_field(&field)?;
     renderer.set_transfer(&scene.transfer);
     // The renderer has its own copy, and the meshes that people draw are large.

@@ -4,8 +4,6 @@ use crate::mesh::Mesh;
 use crate::mesh::cells::Tetrahedra;
 use crate::view::{Camera, Projection, View, hull_area};
 use glam::{DVec2, DVec3};
-use rayon::prelude::*;
-use std::borrow::Cow;
 
 /// Vertical angle of view, in degrees.
 const VIEW_ANGLE: f64 = 30.0;
@@ -18,22 +16,21 @@ const FILL: f64 = 0.94;
 const DIRECTIONS: [[f64; 2]; 4] = [[30.0, 25.0], [60.0, 25.0], [30.0, 50.0], [60.0, 50.0]];
 const BETTER: f64 = 1.25;
 
-/// Corners that the area is judged by.
+/// Points that the area is judged by.
 const JUDGED: usize = 4096;
 
 /// A view of the whole mesh for pictures of `size` (width, height): perspective, z up, from the front right and above, or
 /// further from the side or above where flat or long meshes show more of themselves. They span 94 % of the width or
 /// height.
 pub fn camera(mesh: &Mesh, tetrahedra: &Tetrahedra, size: [u32; 2]) -> Camera {
-    let points = tetrahedra.points(mesh.points());
+    let points = used(mesh, tetrahedra);
     let projection = Projection::Perspective { view_angle: VIEW_ANGLE };
     let from = |[azimuth, elevation]: [f64; 2]| {
         let (azimuth, elevation) = (azimuth.to_radians(), elevation.to_radians());
-        let direction =
-            DVec3::new(azimuth.sin() * elevation.cos(), -azimuth.cos() * elevation.cos(), elevation.sin());
+        let direction = DVec3::new(azimuth.sin() * elevation.cos(), -azimuth.cos() * elevation.cos(), elevation.sin());
         let camera = Camera { position: direction, focal_point: DVec3::ZERO, view_up: DVec3::Z, projection };
-        let camera = around(&points, tetrahedra, camera, size);
-        (shown(&points, tetrahedra, camera, size), camera)
+        let camera = around(&points, camera, size);
+        (shown(&points, camera, size), camera)
     };
     let mut best = from(DIRECTIONS[0]);
     for other in &DIRECTIONS[1..] {
@@ -48,26 +45,32 @@ pub fn camera(mesh: &Mesh, tetrahedra: &Tetrahedra, size: [u32; 2]) -> Camera {
 /// `camera`, moved along its view and aside so that the whole mesh fills pictures of `size`; it stays what it is if that
 /// is not possible. The scale of a parallel view stays.
 pub fn framed(mesh: &Mesh, tetrahedra: &Tetrahedra, camera: Camera, size: [u32; 2]) -> Camera {
-    around(&tetrahedra.points(mesh.points()), tetrahedra, camera, size)
+    around(&used(mesh, tetrahedra), camera, size)
 }
 
-fn around(points: &Cow<[DVec3]>, tetrahedra: &Tetrahedra, camera: Camera, size: [u32; 2]) -> Camera {
-    let corners = tetrahedra.corners.as_flattened().par_iter().map(|&p| &points[p as usize]);
+/// The points that tetrahedra have.
+fn used(mesh: &Mesh, tetrahedra: &Tetrahedra) -> Vec<DVec3> {
+    let points = tetrahedra.points(mesh.points());
+    let mut used = vec![false; points.len()];
+    tetrahedra.corners.as_flattened().iter().for_each(|&p| used[p as usize] = true);
+    points.iter().zip(used).filter_map(|(p, used)| used.then_some(*p)).collect()
+}
+
+fn around(points: &[DVec3], camera: Camera, size: [u32; 2]) -> Camera {
     let towards = camera.position - camera.focal_point;
     let angle = match camera.projection {
         Projection::Perspective { view_angle } => view_angle,
         Projection::Parallel { .. } => VIEW_ANGLE,
     };
-    let filled = Camera::filled(corners, towards, camera.view_up, angle, size, FILL);
+    let filled = Camera::filled(points, towards, camera.view_up, angle, size, FILL);
     filled.map_or(camera, |filled| Camera { projection: camera.projection, ..filled })
 }
 
 /// The area of the mesh's outline in a picture, in pixels, but for its bays.
-fn shown(points: &Cow<[DVec3]>, tetrahedra: &Tetrahedra, camera: Camera, size: [u32; 2]) -> f64 {
+fn shown(points: &[DVec3], camera: Camera, size: [u32; 2]) -> f64 {
     let Ok(view) = View::new(camera, size) else { return 0.0 };
-    let corners = tetrahedra.corners.as_flattened();
-    let step = corners.len().div_ceil(JUDGED).max(1);
-    let seen = corners.iter().step_by(step).filter_map(|&p| view.pixel(points[p as usize]));
+    let step = points.len().div_ceil(JUDGED).max(1);
+    let seen = points.iter().step_by(step).filter_map(|&p| view.pixel(p));
     hull_area(&mut seen.collect::<Vec<DVec2>>())
 }
 

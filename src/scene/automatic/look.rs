@@ -190,9 +190,8 @@ impl Sample {
         if mean.is_nan() || mean <= 0.0 {
             return 1.0;
         }
-        let opacity = |factor: f64| {
-            depths.iter().map(|depth| 1.0 - (-factor * depth).exp()).sum::<f64>() / depths.len() as f64
-        };
+        let opacity =
+            |factor: f64| depths.iter().map(|depth| 1.0 - (-factor * depth).exp()).sum::<f64>() / depths.len() as f64;
         let (mut low, mut high) = ((1e-6 / mean).ln(), (1e6 / mean).ln());
         for _ in 0..60 {
             let middle = (low + high) / 2.0;
@@ -324,7 +323,9 @@ mod tests {
         let mut sum = [0.0; 4];
         for i in 0..count {
             let w = inside(i);
-            assert!(w.iter().all(|x| (-1e-12..=1.0 + 1e-12).contains(x)) && (w.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+            assert!(
+                w.iter().all(|x| (-1e-12..=1.0 + 1e-12).contains(x)) && (w.iter().sum::<f64>() - 1.0).abs() < 1e-12
+            );
             (0..4).for_each(|k| sum[k] += w[k] / count as f64);
         }
         assert!(sum.iter().all(|s| (s - 0.25).abs() < 2e-3), "{sum:?}");
