@@ -76,11 +76,10 @@ fn arrays_of_several_values_are_drawn_directly() {
     let place = Place::new();
     let more = |name: &str, n: usize, value: &dyn Fn(usize, usize) -> String| {
         let list: Vec<String> = (0..27 * n).map(|i| value(i / n, i % n)).collect();
-        let array = format!(
+        format!(
             "<DataArray type=\"UInt8\" Name=\"{name}\" NumberOfComponents=\"{n}\" format=\"ascii\">{}</DataArray>",
             list.join(" ")
-        );
-        array
+        )
     };
     let rgba = more("tint", 4, &|_, k| [255, 51, 0, 102][k].to_string());
     let pair = more("two", 2, &|i, k| if k == 0 { (i % 3).to_string() } else { "5".into() });
