@@ -122,6 +122,11 @@ impl Geometry {
         self.cells.par_iter().map(edges).reduce(|| f64::MIN_POSITIVE, f64::max).sqrt()
     }
 
+    /// Bytes that it takes at most to make one of so many points and tetrahedra, with what [`Faces::new`] needs and leaves.
+    pub(crate) fn room(points: usize, tetrahedra: usize) -> u64 {
+        120 * tetrahedra as u64 + 60 * points as u64
+    }
+
     /// Bytes that a walk reads.
     pub fn bytes(&self) -> u64 {
         (size_of_val(&*self.points) + size_of_val(&*self.cells)) as u64 + self.boundary.bytes()

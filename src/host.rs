@@ -157,6 +157,7 @@ impl Session {
         self.mirrored = matrix.determinant() < 0.0;
         let points = mesh.points();
         let moved = (matrix != DMat4::IDENTITY).then(|| self.renderer.install(|| transformed(points, matrix)));
+        self.renderer.check_room(mesh.points().len(), &tetrahedra)?;
         match moved {
             None => self.renderer.set_mesh(mesh, tetrahedra),
             Some(moved) if self.mirrored => self.renderer.load(&moved, mesh.cells().len(), tetrahedra, &|_| {}),

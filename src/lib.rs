@@ -26,6 +26,7 @@ pub mod host;
 pub mod image;
 pub mod integral;
 pub mod io;
+pub mod memory;
 pub mod mesh;
 pub mod order;
 mod progress;

@@ -12,6 +12,7 @@ use crate::gpu::table::builds;
 use crate::gpu::{DeviceChoice, Gpu};
 use crate::image::Image;
 use crate::integral::{Choice, Exact, Form, Lookup, lookup};
+use crate::memory;
 use crate::mesh::Mesh;
 use crate::mesh::cells::Tetrahedra;
 use crate::mesh::faces::Faces;
@@ -323,7 +324,20 @@ impl Renderer {
         if stopped.load(Relaxed) { Err(Error::Aborted) } else { Ok(image) }
     }
 
+    /// Whether there is memory to draw so many tetrahedra, in a mesh of so many points.
+    ///
+    /// # Errors
+    /// [`Error::NoMemory`] if there is not.
+    pub fn check_room(&self, points: usize, tetrahedra: &Tetrahedra) -> Result<()> {
+        let (points, count) = (points + tetrahedra.added.len(), tetrahedra.corners.len());
+        let what = format!("{count} tetrahedra of {points} points, to find their neighbours");
+        memory::check(&what, Geometry::room(points, count))
+    }
+
     fn render_anyhow(&mut self, view: &View, progress: &Progress) -> Result<Image> {
+        let [w, h] = view.size();
+        let pixels = u64::from(w) * u64::from(h) * size_of::<[f32; 4]>() as u64;
+        memory::check(&format!("a picture of {w}x{h} pixels"), pixels)?;
         match self.try_render(view, progress) {
             Err(Error::Lost(why)) => {
                 tracing::warn!("{why}; opening it again");

@@ -18,6 +18,7 @@ mod types;
 pub use types::{dimension, name};
 
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::mesh::Mesh;
 use crate::progress::Progress;
 use glam::DVec3;
@@ -244,15 +245,17 @@ impl Tetrahedra {
             );
             return Err(Error::Mesh(what));
         }
+        let bytes = total * (size_of::<[u32; 4]>() + size_of::<u32>()) + added * 200;
+        memory::check(&format!("{total} tetrahedra of its cells"), bytes as u64)?;
         let firsts = counts.iter().scan(first, |at, count| {
             *at += count.added;
             Some((*at - count.added) as u32)
         });
         let firsts: Vec<u32> = firsts.collect();
         let solved: Vec<_> = counts.iter_mut().map(|count| std::mem::take(&mut count.solved)).collect();
-        let mut corners = vec![[0; 4]; total];
+        let mut corners = memory::filled("the tetrahedra of its cells", [0; 4], total)?;
         let one_to_one = skipped.total() == 0 && mesh.cells().types.par_iter().all(|&t| t == 10);
-        let mut cell = if one_to_one { Vec::new() } else { vec![0; total] };
+        let mut cell = if one_to_one { Vec::new() } else { memory::filled("the cells of tetrahedra", 0, total)? };
         let parts: Vec<(Added, Listed)> = split_by(&mut corners, &counted)
             .into_par_iter()
             .zip(if one_to_one {

@@ -100,7 +100,8 @@ fn others(drew: &Stats) -> Vec<DeviceChoice> {
 
 fn measure(options: &Options, job: &Job, renderer: &mut Renderer) -> Result<Run> {
     let (view, _) = job.scene.view()?;
-    renderer.set_mesh(&job.mesh, job.tetrahedra.clone());
+    renderer.check_room(job.mesh.points().len(), &job.tetrahedra)?;
+    progress::busy("matching faces", || renderer.set_mesh(&job.mesh, job.tetrahedra.clone()));
     renderer.set_field(&job.field)?;
     renderer.set_transfer(&job.scene.transfer);
     let name = renderer.stats().adapter.clone();

@@ -1,10 +1,10 @@
 //! The switches of the projection engine, as options and in scenes.
 
-use anyhow::{Context, Result};
+use anyhow::{Result, anyhow};
 use clap::Args;
 use halite::project::{Compositing, Fragments, Order, Switches, Target, Thickness};
-use halite::scene::Scene;
-use serde::de::{DeserializeOwned, IntoDeserializer};
+use halite::scene::{Scene, read};
+use serde::de::DeserializeOwned;
 use std::path::Path;
 
 /// What of the projection engine's variant somebody said.
@@ -61,13 +61,12 @@ impl Variant {
 /// The switches of a scene's "projection".
 pub(crate) fn of_scene(scene: &Scene, path: &Path) -> Result<Switches> {
     let Some(value) = &scene.projection else { return Ok(Switches::default()) };
-    serde_path_to_error::deserialize(value).with_context(|| format!("{}: projection", path.display()))
+    read(value).map_err(|what| anyhow!("{}: projection: {what}", path.display()))
 }
 
 /// A variant by the name that scenes know it by.
 pub(crate) fn named<T: DeserializeOwned>(text: &str) -> Result<T, String> {
-    let text: serde::de::value::StrDeserializer<serde::de::value::Error> = text.into_deserializer();
-    T::deserialize(text).map_err(|e| e.to_string())
+    read(&text.into())
 }
 
 /// `NxN` or `NxNxN`; the third is 0 in the first, which only polynomials are.
