@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::field::Field;
 use crate::gpu::DeviceChoice;
 use crate::image::Image;
-use crate::integral::{Choice, Form};
+use crate::integral::Choice;
 use crate::mesh::Mesh;
 use crate::mesh::cells::Tetrahedra;
 use crate::render::{Engine, Renderer, Stats};
@@ -280,6 +280,7 @@ fn transformed(points: &[DVec3], matrix: DMat4) -> Vec<DVec3> {
 mod tests {
     use super::*;
     use crate::field::{Association, Component};
+    use crate::integral::Form;
     use crate::integral::choice::Texels;
     use crate::integral::table::Kind;
     use crate::mesh::generate;

@@ -39,7 +39,7 @@ struct Scene
     for (const auto& p : corners)
     {
       points->InsertNextPoint(p);
-      values->InsertNextValue(1);
+      values->InsertNextValue(1000);
     }
     const vtkIdType ids[4] = { 0, 1, 2, 3 };
     this->Grid->SetPoints(points);

@@ -137,7 +137,8 @@ def test_image_volumes_are_peeled_beside_ours():
             both = peeled(*sheets, *props)
             check(both * only, alone * only, near=1, what=f"the image's part, {heights}")
             mine = (np.abs(alone - bare).max(-1) == 0)[..., None] & (np.abs(ours - bare).max(-1) > 5)[..., None]
-            check(both * mine, ours * mine, near=2, what=f"our part, {heights}")
+            # VTK's layers have 8 bits, and two volumes are rounded more often than one.
+            check(both * mine, ours * mine, near=4, what=f"our part, {heights}")
 
 
 def test_settings_that_are_not_used_refuse_nothing():

@@ -140,6 +140,7 @@ vtkOpenGLQuadHelper& Peeling::Ready(std::unique_ptr<vtkOpenGLQuadHelper>& quad, 
   }
   if (!quad->Program)
   {
+    quad.reset();
     throw std::runtime_error("the window refuses the shaders for depth peeling");
   }
   return *quad;

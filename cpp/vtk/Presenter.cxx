@@ -71,6 +71,16 @@ Peeling& Presenter::GetPeeling()
   return *this->Peels;
 }
 
+bool Presenter::HasContext(vtkOpenGLRenderWindow* window)
+{
+  if (window->IsA("vtkGenericOpenGLRenderWindow"))
+  {
+    return true;
+  }
+  window->MakeCurrent();
+  return window->IsCurrent();
+}
+
 Viewport Presenter::ViewportOf(vtkOpenGLRenderWindow* window, vtkRenderer* renderer, bool isInPass)
 {
   Viewport v;
@@ -163,6 +173,7 @@ void Presenter::Present(vtkTextureObject* texture, const Viewport& v)
   }
   if (!this->Quad->Program)
   {
+    this->Quad.reset();
     throw std::runtime_error("the window refuses the shader that draws pictures");
   }
   texture->Activate();

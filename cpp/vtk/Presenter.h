@@ -37,6 +37,9 @@ public:
 
   vtkOpenGLRenderWindow* GetWindow() const;
 
+  // Makes the window's context the current one. False if it has none: before it was set up, and after it was finalized.
+  static bool HasContext(vtkOpenGLRenderWindow* window);
+
   // Where the renderer draws just now: render passes have frame buffers of other sizes than the window's.
   static Viewport ViewportOf(vtkOpenGLRenderWindow* window, vtkRenderer* renderer, bool isInPass);
 

@@ -17,6 +17,7 @@
 #include "vtkVolumeProperty.h"
 
 #include <cmath>
+#include <stdexcept>
 
 VTK_ABI_NAMESPACE_BEGIN
 
@@ -134,6 +135,10 @@ void vtkHaliteMapper::Internals::DrawIn(vtkOpenGLRenderWindow* window, vtkRender
   Key wanted;
   try
   {
+    if (!Presenter::HasContext(window))
+    {
+      throw std::runtime_error("the window has no OpenGL context: Render() of the window makes one");
+    }
     const Content content = this->Choose(grid, volume);
     // Where surfaces end rays there is nothing between two pixels.
     const double distance = pass ? 1 : this->Self.ImageSampleDistance;

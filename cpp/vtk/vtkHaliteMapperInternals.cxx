@@ -180,8 +180,12 @@ bool vtkHaliteMapper::Internals::Draw(
     this->Say(thrown);
   }
   this->Warn();
-  // Observers may have drawn elsewhere.
-  window->MakeCurrent();
+  // Observers may have drawn elsewhere, or finalized the window: VTK goes on with its frame, and needs what that began with.
+  if (!Presenter::HasContext(window))
+  {
+    window->Start();
+    this->IsReleased = true;
+  }
   return finished && !this->IsReleased;
 }
 
