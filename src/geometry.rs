@@ -7,6 +7,7 @@ pub mod boundary;
 pub mod contacts;
 
 use crate::error::{Error, Result};
+use crate::field::normal::{self, Normal};
 use crate::field::{Association, Field};
 use crate::mesh::cells::Tetrahedra;
 use crate::mesh::faces::{BOUNDARY, Faces};
@@ -128,7 +129,8 @@ impl Geometry {
     }
 }
 
-/// The values of a field with `N` components, in the order of a [`Geometry`].
+/// The values of a field with `N` components, in the order of a [`Geometry`], normalised: what the transfer function tells
+/// apart is in [−1, 1] or near it, and outliers are up to [`normal::MOST`] away.
 #[derive(Debug, Clone)]
 pub enum Values<const N: usize> {
     /// One for each point.
@@ -140,7 +142,8 @@ pub enum Values<const N: usize> {
 }
 
 impl<const N: usize> Values<N> {
-    /// Brings the values of `field` into the order of `geometry`, made from `tetrahedra`.
+    /// Brings the values of `field`, as `normal` maps each component, into the order of `geometry`, made from
+    /// `tetrahedra`.
     ///
     /// # Errors
     /// [`Error::Field`] if there are not as many values as points or cells.
@@ -150,24 +153,28 @@ impl<const N: usize> Values<N> {
         points: usize,
         cells: usize,
         field: &Field,
+        normal: &[Normal; 4],
     ) -> Result<Self> {
         let (what, count) = match field.association() {
             Association::Point => ("points", points),
             Association::Cell => ("cells", cells),
         };
-        if field.values().len() != count * N {
-            return Err(Error::Field(format!("the field has {} values for {count} {what}", field.values().len() / N)));
+        if field.kind().components() != N || field.len() != count * N {
+            return Err(Error::Field(format!("the field has {} values for {count} {what}", field.len() / N)));
         }
-        let values = match field.association() {
-            Association::Point => tetrahedra.values(field.values(), N),
-            Association::Cell => field.values().into(),
-        };
-        let (values, []) = values.as_chunks::<N>() else { return Err(Error::Field("uneven field".into())) };
-        let value = |i: u32| values[i as usize];
+        let limits: [f64; N] =
+            std::array::from_fn(|k| if N == 4 && k < 3 { normal::MOST_COLOUR } else { normal::MOST });
+        let brought = |value: &dyn Fn(usize) -> f64| std::array::from_fn(|k| normal[k].bounded(value(k), limits[k]));
         if field.association() == Association::Cell {
-            let cell = |t: u32| tetrahedra.cell.as_ref().map_or(t, |c| c[t as usize]);
-            return Ok(Values::Cell(geometry.tetrahedron_of.par_iter().map(|&t| value(cell(t))).collect()));
+            let cell = |t: u32| tetrahedra.cell.as_ref().map_or(t, |c| c[t as usize]) as usize;
+            let value = |&t: &u32| brought(&|k| field.value(cell(t) * N + k));
+            return Ok(Values::Cell(geometry.tetrahedron_of.par_iter().map(value).collect()));
         }
+        let added = tetrahedra.added_values(N, |i| field.value(i));
+        let value = |i: u32| {
+            let first = i as usize * N;
+            brought(&|k| first.checked_sub(count * N).map_or_else(|| field.value(first + k), |i| added[i + k]))
+        };
         let at_points: Vec<[f32; N]> = geometry.point_of.par_iter().map(|&p| value(p)).collect();
         let own = |t: u32| tetrahedra.corners[t as usize].map(value);
         let bits = |v: [f32; N]| v.map(f32::to_bits);

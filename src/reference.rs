@@ -78,15 +78,16 @@ impl<'a> Reference<'a> {
     pub fn new(mesh: &Mesh, tetrahedra: &Tetrahedra, field: &Field, transfer: &'a TransferFunction) -> Result<Self> {
         let (points, n) = (mesh.points(), field.kind().components());
         let count = if field.association() == Association::Point { points.len() } else { mesh.cells().len() };
-        if field.values().len() != count * n {
-            return Err(Error::Field(format!("the field has {} values for {count} tuples", field.values().len())));
+        let of_mesh = field.values();
+        if of_mesh.len() != count * n {
+            return Err(Error::Field(format!("the field has {} values for {count} tuples", of_mesh.len())));
         }
         // What the split adds is part of what is given.
         let (points, values) = (
             tetrahedra.points(points),
             match field.association() {
-                Association::Point => tetrahedra.values(field.values(), n),
-                Association::Cell => field.values().into(),
+                Association::Point => tetrahedra.values(of_mesh, n),
+                Association::Cell => of_mesh,
             },
         );
         let used = || tetrahedra.corners.iter().flatten().filter_map(|&p| points.get(p as usize));
@@ -101,9 +102,8 @@ impl<'a> Reference<'a> {
             let value = |corner: u32| {
                 let start = tuple(corner)? * n;
                 let values = values.get(start..start + n)?;
-                let at = |k: usize| {
-                    values.get(k).map_or(0.0, |&v| field.normal(k).mid + field.normal(k).half * f64::from(v))
-                };
+                let full = if field.kind() == Kind::Rgba { field.normal(0).half } else { 1.0 };
+                let at = |k: usize| values.get(k).map_or(0.0, |&v| if k < 3 { v / full } else { v });
                 Some([at(0), at(1), at(2), at(3)])
             };
             let mut tet =

@@ -1,10 +1,11 @@
 //! The whole flow behind one door: mesh, field, transfer function and view in, image out.
 
+mod prepared;
 mod stats;
 mod tables;
 
 use crate::error::{Error, Result};
-use crate::field::{Field, Kind, Normal};
+use crate::field::Field;
 use crate::geometry::{Geometry, Values};
 use crate::gpu::Part;
 use crate::gpu::table::builds;
@@ -20,6 +21,7 @@ use crate::traverse::cpu;
 use crate::traverse::gpu::Traverse;
 use crate::view::{Blend, View};
 use glam::DVec3;
+use prepared::{AnyValues, Prepared};
 use rayon::prelude::*;
 pub use stats::{ProjectionStats, Stats};
 use std::ops::ControlFlow;
@@ -96,20 +98,6 @@ struct Loaded {
     cells: usize,
     /// The longest edge of a cell, in normalised units, once somebody asked.
     longest: Option<f64>,
-}
-
-/// The field that is drawn.
-#[derive(Debug)]
-struct Prepared {
-    normal: [Normal; 4],
-    values: AnyValues,
-}
-
-#[derive(Debug)]
-enum AnyValues {
-    Scalar(Values<1>),
-    Pair(Values<2>),
-    Rgba(Values<4>),
 }
 
 impl Renderer {
@@ -219,6 +207,8 @@ impl Renderer {
     pub fn set_integral(&mut self, integral: Choice) {
         if self.integral != integral {
             self.integral = integral;
+            // Values may have to be in the range of tables.
+            self.exact = None;
             (self.key, self.waits, self.host_builds) = (None, integral.form != Form::Auto, false);
         }
     }
@@ -296,18 +286,11 @@ impl Renderer {
     pub fn set_field(&mut self, field: &Field) -> Result<()> {
         let start = Instant::now();
         let mesh = self.mesh.as_ref().ok_or_else(|| Error::Render("a field needs a mesh first".into()))?;
-        let values = self.pool.install(|| match field.kind() {
-            Kind::Scalar => mesh.values(field).map(AnyValues::Scalar),
-            Kind::Pair => mesh.values(field).map(AnyValues::Pair),
-            Kind::Rgba => mesh.values(field).map(AnyValues::Rgba),
-        })?;
-        self.stats.device_bytes = mesh.geometry.bytes()
-            + match &values {
-                AnyValues::Scalar(v) => v.bytes(),
-                AnyValues::Pair(v) => v.bytes(),
-                AnyValues::Rgba(v) => v.bytes(),
-            };
-        self.field = Some(Prepared { normal: [0, 1, 2, 3].map(|k| field.normal(k)), values });
+        let tables = self.integral.form != Form::Exact;
+        let transfer = self.transfer.as_ref();
+        let prepared = self.pool.install(|| Prepared::new(mesh, field, transfer, tables))?;
+        self.stats.device_bytes = mesh.geometry.bytes() + prepared.values.bytes();
+        self.field = Some(prepared);
         self.forget(Part::Field);
         self.waits = self.integral.form != Form::Auto;
         self.stats.upload_ms = ms(start);
@@ -376,19 +359,30 @@ impl Renderer {
         self.name_device();
     }
 
+    /// Normalises the values anew if the transfer function has changed and asks for it.
+    fn fit_values(&mut self) -> Result<()> {
+        let (None, Some(mesh), Some(field), Some(transfer)) =
+            (&self.exact, &self.mesh, &mut self.field, &self.transfer)
+        else {
+            return Ok(());
+        };
+        let tables = self.integral.form != Form::Exact;
+        if self.pool.install(|| field.fit(mesh, transfer, tables))? {
+            self.forget(Part::Field);
+        }
+        Ok(())
+    }
+
     fn try_render(&mut self, view: &View, progress: &Progress) -> Result<Image> {
         let start = Instant::now();
         let missing = |what: &str| Error::Render(format!("there is no {what} to draw"));
         let on_device = !self.host_builds && self.gpu().is_some_and(|gpu| builds(gpu, &self.integral));
+        self.fit_values()?;
         let mesh = self.mesh.as_mut().ok_or_else(|| missing("mesh"))?;
         let field = self.field.as_ref().ok_or_else(|| missing("field"))?;
         let transfer = self.transfer.as_ref().ok_or_else(|| missing("transfer function"))?;
-        let kind = match field.values {
-            AnyValues::Scalar(_) => Kind::Scalar,
-            AnyValues::Pair(_) => Kind::Pair,
-            AnyValues::Rgba(_) => Kind::Rgba,
-        };
-        let exact = self.exact.get_or_insert_with(|| Exact::new(transfer, kind, &field.normal, mesh.geometry.scale));
+        let (kind, normal) = (field.kind(), field.normal());
+        let exact = self.exact.get_or_insert_with(|| Exact::new(transfer, kind, normal, mesh.geometry.scale));
         let key = match &self.key {
             Some(key) => key,
             None => {
@@ -409,7 +403,7 @@ impl Renderer {
                 let key = (choice.form != Form::Exact).then(|| {
                     let (pool, geometry) = (&self.pool, &mesh.geometry);
                     let longest = *mesh.longest.get_or_insert_with(|| pool.install(|| geometry.longest_edge()));
-                    let exact = Exact::new(transfer, kind, &field.normal, geometry.scale);
+                    let exact = Exact::new(transfer, kind, normal, geometry.scale);
                     Arc::new(Key { exact, choice, longest, on_device })
                 });
                 self.key.insert(key)
@@ -518,12 +512,6 @@ fn hold(
     if wait { gpu.wait() } else { Ok(()) }
 }
 
-impl Loaded {
-    fn values<const N: usize>(&self, field: &Field) -> Result<Values<N>> {
-        Values::new(&self.geometry, &self.tetrahedra, self.points, self.cells, field)
-    }
-}
-
 /// Everything that a frame depends on.
 struct Frame<'a> {
     mesh: &'a Loaded,
@@ -569,7 +557,7 @@ impl Frame<'_> {
 
     /// The pixel of a ray whose largest values are `v`: colour and opacity there, premultiplied.
     fn largest<const N: usize>(&self, v: &[f32; N]) -> [f32; 4] {
-        let own = |k: usize| self.field.normal[k].invert(f64::from(v[k]));
+        let own = |k: usize| self.field.normal()[k].invert(f64::from(v[k]));
         let [r, g, b] =
             if N == 4 { [own(0), own(1), own(2)].map(|c| c.clamp(0.0, 1.0)) } else { self.transfer.color_at(own(0)) };
         let a = self.transfer.opacity_at(own(N - 1)).min(1.0);
