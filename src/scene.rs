@@ -9,6 +9,7 @@
 //! }
 //! ```
 
+pub mod automatic;
 mod file;
 mod opaque;
 

@@ -1,10 +1,10 @@
+use crate::output;
 use crate::render::{self, Job};
-use crate::{choose, output};
 use anyhow::Result;
 use clap::Args;
 use halite::mesh::{cells::Tetrahedra, generate};
 use halite::render::Renderer;
-use halite::scene::Scalars;
+use halite::scene::{Scalars, automatic};
 use std::path::PathBuf;
 
 /// Draw a built-in mesh, to see that everything works
@@ -32,6 +32,6 @@ fn prepare() -> Result<Job> {
     let tetrahedra = Tetrahedra::new(&mesh)?;
     let scalars = Scalars { name: "s".into(), association: None, component: None };
     let field = scalars.field(&mesh)?;
-    let scene = choose::scene(&mesh, &tetrahedra, scalars, &field, Default::default())?;
+    let scene = automatic::scene(&mesh, &tetrahedra, scalars, &field, Default::default())?;
     Ok(Job { mesh, tetrahedra, field, scene, load_ms: 0.0, split_ms: 0.0 })
 }

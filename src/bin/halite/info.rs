@@ -1,4 +1,4 @@
-use crate::{choose, output, progress};
+use crate::{output, progress};
 use anyhow::Result;
 use clap::Args;
 use halite::field::Association;
@@ -7,6 +7,7 @@ use halite::geometry::contacts::Contacts;
 use halite::mesh::cells::{self, Tetrahedra};
 use halite::mesh::faces::Faces;
 use halite::mesh::{Array, Mesh, Values};
+use halite::scene::automatic;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -129,7 +130,7 @@ fn describe(out: &mut String, name: &str, mesh: &Mesh) -> Result<()> {
     };
     row(contacts.touching, &format!("boundary faces that lie on other cells without sharing a face{of}"))?;
     row(contacts.overlapping, &format!("boundary faces inside other cells: cells overlap{of}"))?;
-    let choice = choose::scalars(mesh, None).ok();
+    let choice = automatic::scalars(mesh, None).ok();
     let tuples = match choice.as_ref().and_then(|scalars| scalars.association) {
         Some(Association::Cell) => tetrahedra.corners.len(),
         _ => points.len(),

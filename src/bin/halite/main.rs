@@ -2,7 +2,6 @@
 
 mod bench;
 mod camera;
-mod choose;
 mod demo;
 mod info;
 mod integral;

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 use halite::field::Component;
+use halite::scene::automatic::{Opacity, Place};
 use halite::view::ClippingPlane;
 
 fn number(text: &str) -> Result<f64, String> {
@@ -87,24 +88,15 @@ pub(crate) fn plane(text: &str) -> Result<ClippingPlane, String> {
     if normal == DVec3::ZERO { Err("the normal is zero".into()) } else { Ok(ClippingPlane { origin, normal }) }
 }
 
-/// An opacity function; places marked so are percent of the range.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Opacity(Vec<(f64, bool, f64)>);
-
-impl Opacity {
-    /// Its knots, for a range of scalars.
-    pub(crate) fn over(&self, [lo, hi]: [f64; 2]) -> Vec<(f64, f64)> {
-        let at = |s: f64, percent: bool| if percent { lo + (hi - lo) * (s / 100.0) } else { s };
-        self.0.iter().map(|&(s, percent, a)| (at(s, percent), a)).collect()
-    }
-}
-
 /// `S:A,S:A,…`
 pub(crate) fn opacity(text: &str) -> Result<Opacity, String> {
     let knot = |k: &str| {
         let (s, a) = k.split_once(':').ok_or("knots are scalar:opacity, such as 0:0,50%:0.2,1:1")?;
-        let (percent, s) = s.strip_suffix('%').map_or((false, s), |s| (true, s));
-        Ok((number(s)?, percent, number(a)?))
+        let place = match s.strip_suffix('%') {
+            Some(percent) => Place::Share(number(percent)? / 100.0),
+            None => Place::Scalar(number(s)?),
+        };
+        Ok((place, number(a)?))
     };
     text.split(',').map(knot).collect::<Result<_, String>>().map(Opacity)
 }

@@ -1,4 +1,4 @@
-use crate::{camera, choose, integral, output, parse, progress, variant};
+use crate::{camera, integral, output, parse, progress, variant};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use halite::field::{Association, Component, Field};
@@ -8,7 +8,7 @@ use halite::integral::choice::{Choice, Form};
 use halite::mesh::{Mesh, cells::Tetrahedra};
 use halite::project::Switches;
 use halite::render::{self, Renderer, Stats};
-use halite::scene::{Scalars, Scene};
+use halite::scene::{Scalars, Scene, automatic};
 use halite::transfer::TransferFunction;
 use halite::transfer::colormap::ColorMap;
 use halite::view::{Blend, ClippingPlane};
@@ -62,7 +62,7 @@ pub(crate) struct Request {
     range: Option<[f64; 2]>,
     /// Opacity at scalars, linear between them; a scalar may be a percentage of the range: 0%:0,40%:0.3,100%:1
     #[arg(long, value_name = "S:A,...", value_parser = parse::opacity, allow_hyphen_values = true, help_heading = "Look")]
-    opacity: Option<parse::Opacity>,
+    opacity: Option<automatic::Opacity>,
     /// The length that opacities are meant for, in world units
     #[arg(long, value_name = "LENGTH", value_parser = parse::positive, help_heading = "Look")]
     unit_distance: Option<f64>,
@@ -163,14 +163,14 @@ pub(crate) fn prepare(options: &Request, given: Option<Scene>) -> Result<Job> {
     let mut scene = match given {
         Some(scene) => options.restyled(scene, map)?,
         None => {
-            let wishes = choose::Wishes {
+            let wishes = automatic::Wishes {
                 range: options.range,
                 map,
                 opacity: options.opacity.clone(),
                 unit_distance: options.unit_distance,
                 blend: options.blend().unwrap_or_default(),
             };
-            choose::scene(&mesh, &tetrahedra, scalars, &field, wishes)?
+            automatic::scene(&mesh, &tetrahedra, scalars, &field, wishes)?
         }
     };
     scene.size = options.size.unwrap_or(scene.size);
@@ -270,7 +270,7 @@ impl Request {
         let mut scalars = match (&self.scalars, scene) {
             (Some(name), _) => Scalars { name: name.clone(), association: None, component: None },
             (None, Some(scene)) => scene.scalars.clone(),
-            (None, None) => choose::scalars(mesh, association).with_context(|| self.input.display().to_string())?,
+            (None, None) => automatic::scalars(mesh, association).with_context(|| self.input.display().to_string())?,
         };
         scalars.association = association.or(scalars.association);
         scalars.component = self.component.or(scalars.component);

@@ -1,14 +1,13 @@
 //! What is drawn when nobody says: an array, a range, colours, opacities and a view that show something of any mesh.
 
-use crate::parse::Opacity;
-use anyhow::{Result, bail};
+use super::{Scalars, Scene};
+use crate::error::{Error, Result};
+use crate::field::{Association, Component, Field};
+use crate::mesh::{Array, Mesh, Values, cells::Tetrahedra};
+use crate::transfer::TransferFunction;
+use crate::transfer::colormap::ColorMap;
+use crate::view::{Blend, Camera, Projection};
 use glam::DVec3;
-use halite::field::{Association, Component, Field};
-use halite::mesh::{Array, Mesh, Values, cells::Tetrahedra};
-use halite::scene::{Scalars, Scene};
-use halite::transfer::TransferFunction;
-use halite::transfer::colormap::ColorMap;
-use halite::view::{Blend, Camera, Projection};
 use std::path::PathBuf;
 
 /// Behind the volume: dark, but not so that black parts of it vanish.
@@ -44,13 +43,42 @@ const NOT_VALUES: [&str; 13] = [
 ];
 
 /// What of the look somebody did say.
-#[derive(Default)]
-pub(crate) struct Wishes {
-    pub(crate) range: Option<[f64; 2]>,
-    pub(crate) map: Option<ColorMap>,
-    pub(crate) opacity: Option<Opacity>,
-    pub(crate) unit_distance: Option<f64>,
-    pub(crate) blend: Blend,
+#[derive(Debug, Clone, Default)]
+pub struct Wishes {
+    /// The scalars that colours and opacities range over.
+    pub range: Option<[f64; 2]>,
+    /// The colours.
+    pub map: Option<ColorMap>,
+    /// The opacities.
+    pub opacity: Option<Opacity>,
+    /// The length that opacities are meant for, in world units.
+    pub unit_distance: Option<f64>,
+    /// How the values along a ray become a pixel.
+    pub blend: Blend,
+}
+
+/// Where a knot of an opacity function is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Place {
+    /// At a scalar.
+    Scalar(f64),
+    /// At this share of the range: 0 is its start, 1 its end.
+    Share(f64),
+}
+
+/// An opacity function whose knots may move with the range of scalars.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Opacity(pub Vec<(Place, f64)>);
+
+impl Opacity {
+    /// Its knots, scalar and opacity, for a range of scalars.
+    pub fn over(&self, [lo, hi]: [f64; 2]) -> Vec<(f64, f64)> {
+        let at = |place| match place {
+            Place::Scalar(s) => s,
+            Place::Share(share) => lo + (hi - lo) * share,
+        };
+        self.0.iter().map(|&(place, a)| (at(place), a)).collect()
+    }
 }
 
 /// Whether an array, by its name, counts or marks things.
@@ -66,7 +94,10 @@ fn varies(array: &Array) -> bool {
 }
 
 /// The array that says most: real numbers before integers, points before cells, scalars before vectors.
-pub(crate) fn scalars(mesh: &Mesh, of: Option<Association>) -> Result<Scalars> {
+///
+/// # Errors
+/// [`Error::Field`] if there is no array.
+pub fn scalars(mesh: &Mesh, of: Option<Association>) -> Result<Scalars> {
     let points = mesh.point_arrays().iter().map(|a| (Association::Point, a));
     let cells = mesh.cell_arrays().iter().map(|a| (Association::Cell, a));
     let all = points.chain(cells).filter(|(a, _)| of.is_none_or(|of| of == *a));
@@ -80,14 +111,14 @@ pub(crate) fn scalars(mesh: &Mesh, of: Option<Association>) -> Result<Scalars> {
             Some(Association::Cell) => "cells",
             None => "points or cells",
         };
-        bail!("it has no array of {of}, so no values to draw");
+        return Err(Error::Field(format!("it has no array of {of}, so no values to draw")));
     };
     let component = if array.components > 1 { Component::Magnitude } else { Component::Index(0) };
     Ok(Scalars { name: array.name.clone(), association: Some(association), component: Some(component) })
 }
 
 /// A view of the whole mesh: perspective, from the front right and above, z up.
-pub(crate) fn camera(mesh: &Mesh, tetrahedra: &Tetrahedra) -> Camera {
+pub fn camera(mesh: &Mesh, tetrahedra: &Tetrahedra) -> Camera {
     let (lo, hi) = bounds(mesh, tetrahedra);
     let center = lo.midpoint(hi);
     let points = tetrahedra.points(mesh.points());
@@ -111,7 +142,7 @@ fn direction() -> DVec3 {
 }
 
 /// The box around all tetrahedra.
-pub(crate) fn bounds(mesh: &Mesh, tetrahedra: &Tetrahedra) -> (DVec3, DVec3) {
+pub fn bounds(mesh: &Mesh, tetrahedra: &Tetrahedra) -> (DVec3, DVec3) {
     let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     let points = tetrahedra.points(mesh.points());
     tetrahedra.corners.as_flattened().iter().fold(empty, |(lo, hi), &p| {
@@ -121,13 +152,10 @@ pub(crate) fn bounds(mesh: &Mesh, tetrahedra: &Tetrahedra) -> (DVec3, DVec3) {
 }
 
 /// A scene that shows `field`, which `scalars` are in `mesh`.
-pub(crate) fn scene(
-    mesh: &Mesh,
-    tetrahedra: &Tetrahedra,
-    scalars: Scalars,
-    field: &Field,
-    wishes: Wishes,
-) -> Result<Scene> {
+///
+/// # Errors
+/// [`Error::Transfer`] if what was wished for is no transfer function.
+pub fn scene(mesh: &Mesh, tetrahedra: &Tetrahedra, scalars: Scalars, field: &Field, wishes: Wishes) -> Result<Scene> {
     Ok(Scene {
         mesh: PathBuf::new(),
         transfer: transfer(mesh, tetrahedra, &scalars.name, field, &wishes)?,
