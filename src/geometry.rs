@@ -130,7 +130,7 @@ impl Geometry {
 }
 
 /// The values of a field with `N` components, in the order of a [`Geometry`], normalised: what the transfer function tells
-/// apart is in [−1, 1] or near it, and outliers are up to [`normal::MOST`] away.
+/// apart is in [−1, 1] or near it, and outliers are up to 2⁴⁰ away.
 #[derive(Debug, Clone)]
 pub enum Values<const N: usize> {
     /// One for each point.

@@ -19,7 +19,7 @@ pub struct Normal {
 
 /// The greatest normalised value: what is farther from 0 is taken to be here. No function tells values apart there, and a
 /// segment that reaches so far passes all knots in its first 1e-12.
-pub const MOST: f64 = (1u64 << 40) as f64;
+pub(crate) const MOST: f64 = (1u64 << 40) as f64;
 
 /// The greatest normalised component of a colour.
 pub(crate) const MOST_COLOUR: f64 = 1e30;
