@@ -13,8 +13,11 @@ use crate::mesh::cells::Tetrahedra;
 use crate::mesh::faces::{BOUNDARY, Faces};
 use boundary::Boundary;
 use bytemuck::Zeroable;
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use rayon::prelude::*;
+
+/// Meshes that are less thick than this, of what they are wide, are too flat for f32.
+const FLATTEST: f64 = 5e-5;
 
 /// One tetrahedron as engines see it: 32 bytes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, bytemuck::Pod, Zeroable)]
@@ -113,6 +116,20 @@ impl Geometry {
         self.boundary.refit(&self.points);
     }
 
+    /// Whether the mesh is so flat, or so thin a needle, that f32 tells no lengths across it: the variance of its points
+    /// along one of their principal axes is next to nothing beside that along another.
+    pub fn is_flat(&self) -> bool {
+        let n = self.points.len().max(1) as f64;
+        let mean = self.points.par_iter().copied().reduce(|| DVec3::ZERO, |a, b| a + b) / n;
+        let product = |p: &DVec3| {
+            let d = *p - mean;
+            DMat3::from_cols(d * d.x, d * d.y, d * d.z)
+        };
+        let covariance = self.points.par_iter().map(product).reduce(|| DMat3::ZERO, |a, b| a + b) * (1.0 / n);
+        let [least, greatest] = outer_eigenvalues(covariance);
+        !self.cells.is_empty() && least < FLATTEST * FLATTEST * greatest
+    }
+
     /// The longest edge of a cell, in normalised units: no segment of a ray is longer.
     pub fn longest_edge(&self) -> f64 {
         let edges = |c: &Cell| {
@@ -196,6 +213,20 @@ impl<const N: usize> Values<N> {
             Values::Corner(v) => size_of_val(&**v) as u64,
         }
     }
+}
+
+/// The least and the greatest eigenvalue of a symmetric matrix (Smith 1961).
+fn outer_eigenvalues(m: DMat3) -> [f64; 2] {
+    let mean = (m.x_axis.x + m.y_axis.y + m.z_axis.z) / 3.0;
+    let rest = m - DMat3::from_diagonal(DVec3::splat(mean));
+    let square = rest.x_axis.length_squared() + rest.y_axis.length_squared() + rest.z_axis.length_squared();
+    let p = (square / 6.0).sqrt();
+    if p <= 0.0 {
+        return [mean; 2];
+    }
+    let angle = ((rest * (1.0 / p)).determinant() / 2.0).clamp(-1.0, 1.0).acos() / 3.0;
+    let third = std::f64::consts::TAU / 3.0;
+    [mean + 2.0 * p * (angle + third).cos(), mean + 2.0 * p * angle.cos()]
 }
 
 /// Centre and scale that bring what lies between two corners into [−1, 1]³.

@@ -1,28 +1,27 @@
 //! The whole flow behind one door: mesh, field, transfer function and view in, image out.
 
+mod backend;
 mod prepared;
 mod stats;
 mod tables;
 
 use crate::error::{Error, Result};
 use crate::field::Field;
-use crate::geometry::{Geometry, Values};
+use crate::geometry::Geometry;
 use crate::gpu::Part;
 use crate::gpu::table::builds;
 use crate::gpu::{DeviceChoice, Gpu};
 use crate::image::Image;
-use crate::integral::{Choice, Exact, Form, Integral, Lookup, lookup};
+use crate::integral::{Choice, Exact, Form, Lookup, lookup};
 use crate::mesh::Mesh;
 use crate::mesh::cells::Tetrahedra;
 use crate::mesh::faces::Faces;
-use crate::project::{self, Switches, gpu::Project};
+use crate::project::Switches;
 use crate::transfer::TransferFunction;
-use crate::traverse::cpu;
-use crate::traverse::gpu::Traverse;
 use crate::view::{Blend, View};
+use backend::{Backend, Drawn};
 use glam::DVec3;
 use prepared::{AnyValues, Prepared};
-use rayon::prelude::*;
 pub use stats::{ProjectionStats, Stats};
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -48,10 +47,8 @@ pub enum Engine {
 pub struct Renderer {
     pool: rayon::ThreadPool,
     choice: DeviceChoice,
-    /// None where the CPU draws.
-    device: Option<Traverse>,
-    /// What draws instead, if the engine is [`Engine::Project`].
-    project: Option<Project>,
+    engine: Engine,
+    backend: Backend,
     switches: Switches,
     mesh: Option<Loaded>,
     field: Option<Prepared>,
@@ -96,8 +93,32 @@ struct Loaded {
     geometry: Geometry,
     points: usize,
     cells: usize,
+    /// Whether cells know their neighbours.
+    connected: bool,
+    /// Whether it is too flat for a device, whose lengths are of 32 bits.
+    flat: bool,
     /// The longest edge of a cell, in normalised units, once somebody asked.
     longest: Option<f64>,
+}
+
+impl Loaded {
+    /// `tetrahedra` of `points`, of a mesh of so many cells; `connected` if anything but a device draws it.
+    fn new(points: &[DVec3], cells: usize, tetrahedra: Tetrahedra, connected: bool, on_device: bool) -> Self {
+        let count = points.len();
+        let points = tetrahedra.points(points);
+        let mut geometry = Geometry::default();
+        if !connected {
+            geometry = Geometry::unconnected(&points, &tetrahedra);
+        }
+        let flat = !connected && geometry.is_flat();
+        let connected = connected || flat;
+        if connected {
+            geometry = Geometry::new(&points, &tetrahedra, &Faces::new(&points, &tetrahedra.corners));
+        }
+        let flat = on_device && geometry.is_flat();
+        drop(points);
+        Loaded { tetrahedra, geometry, points: count, cells, connected, flat, longest: None }
+    }
 }
 
 impl Renderer {
@@ -130,20 +151,12 @@ impl Renderer {
             .build()
             .map_err(|e| Error::Render(format!("cannot start {threads} threads: {e}")))?;
         let choice = choice.or_environment();
-        let project = if engine == Engine::Project { Some(Project::open(&choice)?) } else { None };
-        let device = match if project.is_some() { Ok(None) } else { Gpu::open(&choice) } {
-            Err(e) if choice == DeviceChoice::Auto => {
-                tracing::warn!("drawing on the CPU: {e}");
-                None
-            }
-            opened => opened?.map(Traverse::new),
-        };
-        let stats = Stats { engine: if project.is_some() { "project" } else { "traverse" }.into(), ..Stats::default() };
+        let backend = Backend::open(engine, &choice)?;
         let mut renderer = Renderer {
             pool,
             choice,
-            device,
-            project,
+            engine,
+            backend,
             switches: Switches::default(),
             mesh: None,
             field: None,
@@ -154,31 +167,26 @@ impl Renderer {
             key: None,
             waits: true,
             host_builds: false,
-            stats,
+            stats: Stats::default(),
         };
         renderer.name_device();
         Ok(renderer)
     }
 
     #[cfg(test)]
-    pub(crate) fn device(&mut self) -> Option<&mut Traverse> {
-        self.device.as_mut()
-    }
-
-    #[cfg(test)]
-    pub(crate) fn project(&mut self) -> Option<&mut Project> {
-        self.project.as_mut()
-    }
-
-    fn gpu(&self) -> Option<&Gpu> {
-        self.project.as_ref().map(Project::gpu).or(self.device.as_ref().map(Traverse::gpu))
+    pub(crate) fn backend(&mut self) -> &mut Backend {
+        &mut self.backend
     }
 
     fn name_device(&mut self) {
         // Whether tables are built on the device depends on it.
         self.key = None;
-        let gpu = self.project.as_ref().map(Project::gpu).or(self.device.as_ref().map(Traverse::gpu));
-        (self.stats.device, self.stats.adapter) = match gpu {
+        let flat = self.mesh.as_ref().is_some_and(|m| m.flat);
+        self.stats.engine = if flat { Backend::without_device().engine() } else { self.backend.engine() }.into();
+        if flat && self.backend.gpu().is_some() && self.stats.device != "cpu" {
+            tracing::warn!("the mesh is too flat for the 32-bit floats of a device; the CPU draws it, by the walk");
+        }
+        (self.stats.device, self.stats.adapter) = match self.backend.gpu().filter(|_| !flat) {
             Some(gpu) => ("gpu".into(), gpu.adapter.name.clone()),
             None => ("cpu".into(), format!("{} threads", self.pool.current_num_threads())),
         };
@@ -187,14 +195,8 @@ impl Renderer {
     /// Takes `part` for changed, wherever it is kept.
     fn forget(&mut self, part: Part) {
         (self.exact, self.key) = (None, None);
-        if let Some(traverse) = &mut self.device {
-            traverse.forget(part);
-            traverse.forget(Part::Function);
-        }
-        if let Some(project) = &mut self.project {
-            project.forget(part);
-            project.forget(Part::Function);
-        }
+        self.backend.forget(part);
+        self.backend.forget(Part::Function);
     }
 
     /// Draws with other variants of the projection engine from now on; nothing to other engines.
@@ -232,23 +234,16 @@ impl Renderer {
     /// As [`Self::set_mesh`], of a mesh of so many `cells` and these points.
     pub(crate) fn load(&mut self, points: &[DVec3], cells: usize, tetrahedra: Tetrahedra) {
         let start = Instant::now();
-        // Projected cells need no neighbours.
-        let connected = self.project.is_none();
-        let geometry = self.pool.install(|| {
-            let points = tetrahedra.points(points);
-            if !connected {
-                return Geometry::unconnected(&points, &tetrahedra);
-            }
-            let faces = Faces::new(&points, &tetrahedra.corners);
-            Geometry::new(&points, &tetrahedra, &faces)
-        });
+        let (connected, on_device) = (self.backend.needs_neighbours(), self.backend.gpu().is_some());
+        let mesh = self.pool.install(|| Loaded::new(points, cells, tetrahedra, connected, on_device));
         self.stats.faces_ms = ms(start);
         self.stats.cells = cells as u64;
-        self.stats.tetrahedra = tetrahedra.corners.len() as u64;
-        self.stats.device_bytes = geometry.bytes();
+        self.stats.tetrahedra = mesh.tetrahedra.corners.len() as u64;
+        self.stats.device_bytes = mesh.geometry.bytes();
         self.field = None;
         self.forget(Part::Mesh);
-        self.mesh = Some(Loaded { tetrahedra, geometry, points: points.len(), cells, longest: None });
+        self.mesh = Some(mesh);
+        self.name_device();
         self.waits = self.integral.form != Form::Auto;
     }
 
@@ -266,15 +261,28 @@ impl Renderer {
         self.pool.install(|| mesh.geometry.set_points(&mesh.tetrahedra.points(points)));
         let scaled = mesh.geometry.scale != scale;
         (mesh.longest, self.key) = (None, None);
-        if let Some(traverse) = &mut self.device {
-            traverse.forget(Part::Points);
+        mesh.flat = self.backend.gpu().is_some() && mesh.geometry.is_flat();
+        if mesh.flat && !mesh.connected {
+            return self.connect(points);
         }
-        if let Some(project) = &mut self.project {
-            project.forget(Part::Points);
-        }
+        self.name_device();
+        self.backend.forget(Part::Points);
         // Extinction counts per normalised length.
         if scaled {
             self.forget(Part::Function);
+        }
+        Ok(())
+    }
+
+    /// Finds the neighbours of cells of a mesh that has become too flat for a device; its points are these.
+    fn connect(&mut self, points: &[DVec3]) -> Result<()> {
+        let field = self.field.take();
+        if let Some(Loaded { tetrahedra, cells, .. }) = self.mesh.take() {
+            self.load(points, cells, tetrahedra);
+        }
+        if let (Some(mut field), Some(mesh)) = (field, &self.mesh) {
+            self.pool.install(|| field.bring_to(mesh))?;
+            self.field = Some(field);
         }
         Ok(())
     }
@@ -326,26 +334,25 @@ impl Renderer {
 
     fn render_anyhow(&mut self, view: &View, progress: &Progress) -> Result<Image> {
         match self.try_render(view, progress) {
-            Err(Error::Lost(why)) if self.project.is_some() => {
-                tracing::warn!("{why}; opening it again");
-                self.project = Some(Project::open(&self.choice)?);
-                self.key = None;
-                return self.try_render(view, progress);
-            }
             Err(Error::Lost(why)) => {
-                self.device = Gpu::open(&self.choice).unwrap_or_default().map(Traverse::new);
+                tracing::warn!("{why}; opening it again");
+                match Backend::open(self.engine, &self.choice) {
+                    Ok(backend) => self.backend = backend,
+                    Err(_) if self.backend.may_fall_back() => self.backend = Backend::without_device(),
+                    Err(e) => return Err(e),
+                }
                 self.name_device();
-                tracing::warn!("{why}; now drawing on {} ({})", self.stats.device, self.stats.adapter);
+                tracing::warn!("now drawing on {} ({})", self.stats.device, self.stats.adapter);
             }
             Err(e @ (Error::Memory { .. } | Error::Device(_)))
-                if self.choice == DeviceChoice::Auto && self.project.is_none() =>
+                if self.choice == DeviceChoice::Auto && self.backend.may_fall_back() =>
             {
                 self.draw_on_cpu(&e);
             }
             done => return done,
         }
         match self.try_render(view, progress) {
-            Err(e @ Error::Lost(_)) => {
+            Err(e @ Error::Lost(_)) if self.backend.may_fall_back() => {
                 self.draw_on_cpu(&e);
                 self.try_render(view, progress)
             }
@@ -355,7 +362,7 @@ impl Renderer {
 
     pub(crate) fn draw_on_cpu(&mut self, why: &Error) {
         tracing::warn!("{why}; now drawing on the CPU");
-        self.device = None;
+        self.backend = Backend::without_device();
         self.name_device();
     }
 
@@ -376,7 +383,8 @@ impl Renderer {
     fn try_render(&mut self, view: &View, progress: &Progress) -> Result<Image> {
         let start = Instant::now();
         let missing = |what: &str| Error::Render(format!("there is no {what} to draw"));
-        let on_device = !self.host_builds && self.gpu().is_some_and(|gpu| builds(gpu, &self.integral));
+        let flat = self.mesh.as_ref().is_some_and(|m| m.flat);
+        let on_device = !flat && !self.host_builds && self.backend.gpu().is_some_and(|gpu| builds(gpu, &self.integral));
         self.fit_values()?;
         let mesh = self.mesh.as_mut().ok_or_else(|| missing("mesh"))?;
         let field = self.field.as_ref().ok_or_else(|| missing("field"))?;
@@ -416,7 +424,7 @@ impl Renderer {
         };
         if let (Some(key), Some(built)) = (key, built.as_ref().filter(|b| b.table.source().is_some())) {
             let asked = Instant::now();
-            match hold(&mut self.project, &mut self.device, exact, &built.table, self.waits) {
+            match self.backend.hold(exact, &built.table, self.waits) {
                 Err(e @ Error::Lost(_)) => return Err(e),
                 Err(e) => {
                     tracing::warn!("{e}; building the table on the CPU");
@@ -433,44 +441,29 @@ impl Renderer {
         self.stats.integral = table.map_or(Form::Exact, |t| t.choice().form).name().into();
         self.stats.table_ms = built.as_ref().map_or(0.0, |b| b.ms);
         self.stats.table_bytes = table.map_or(0, |t| Choice::bytes(t.size()));
-        if let Some(project) = &mut self.project {
-            let uploaded = project.gpu().uploaded();
-            let (geometry, switches) = (&mesh.geometry, &self.switches);
-            let (pixels, counts) = self.pool.install(|| match &field.values {
-                AnyValues::Scalar(v) => project.render(geometry, v, exact, table, view, switches),
-                AnyValues::Pair(v) => project.render(geometry, v, exact, table, view, switches),
-                AnyValues::Rgba(v) => project.render(geometry, v, exact, table, view, switches),
-            })?;
-            let _ = progress(1.0);
-            self.stats.uploaded_bytes = project.gpu().uploaded() - uploaded;
-            self.stats.device_bytes = project.gpu().allocated();
-            let project::Counts { cells, order_ms, project_ms, draw_ms, fragments } = counts;
-            self.stats.projection =
-                Some(ProjectionStats { drawn_cells: cells, order_ms, project_ms, draw_ms, fragments });
-            self.stats.device_ms = project_ms.zip(draw_ms).map(|(p, d)| p + d);
-            self.stats.frame_ms = ms(start);
-            self.build_next(late)?;
-            return Ok(Image { size: view.size(), pixels });
-        }
-        let frame = Frame { mesh, field, transfer, exact, table, view, progress };
-        let device = &mut self.device;
-        let uploaded = device.as_ref().map_or(0, |t| t.gpu().uploaded());
-        let (image, counts, device_ms) = self.pool.install(|| match &field.values {
-            AnyValues::Scalar(v) => frame.render(v, device),
-            AnyValues::Pair(v) => frame.render(v, device),
-            AnyValues::Rgba(v) => frame.render(v, device),
+        let switches = &self.switches;
+        let frame = Frame { mesh, field, transfer, exact, table, view, switches, progress };
+        let uploaded = self.backend.gpu().map_or(0, Gpu::uploaded);
+        let mut walk = Backend::without_device();
+        let backend = if mesh.flat { &mut walk } else { &mut self.backend };
+        let drawn = self.pool.install(|| match &field.values {
+            AnyValues::Scalar(v) => backend.draw(&frame, v),
+            AnyValues::Pair(v) => backend.draw(&frame, v),
+            AnyValues::Rgba(v) => backend.draw(&frame, v),
         })?;
-        if let Some(traverse) = device {
-            self.stats.uploaded_bytes = traverse.gpu().uploaded() - uploaded;
-            self.stats.device_bytes = traverse.gpu().allocated();
+        if let Some(gpu) = self.backend.gpu() {
+            self.stats.uploaded_bytes = gpu.uploaded() - uploaded;
+            self.stats.device_bytes = gpu.allocated();
         }
+        let Drawn { pixels, counts, device_ms, projection } = drawn;
         self.stats.device_ms = device_ms;
         self.stats.steps = counts.steps;
         self.stats.repaired_rays = counts.repaired;
         self.stats.cpu_rays = counts.unfinished;
+        self.stats.projection = projection;
         self.stats.frame_ms = ms(start);
         self.build_next(late)?;
-        Ok(image)
+        Ok(Image { size: view.size(), pixels })
     }
 
     /// Has the table built that a frame was drawn without.
@@ -479,7 +472,7 @@ impl Renderer {
         self.tables.start(&key, &self.pool)?;
         if let (true, Some(built), Some(exact)) = (key.on_device, self.tables.ready(&key), &self.exact) {
             // What fails now fails again in the next frame, which says so.
-            let _ = hold(&mut self.project, &mut self.device, exact, &built.table, false);
+            let _ = self.backend.hold(exact, &built.table, false);
         }
         Ok(())
     }
@@ -490,28 +483,6 @@ impl Renderer {
     }
 }
 
-/// Has the device that draws hold `table`, or build it; `wait`s until that is done.
-fn hold(
-    project: &mut Option<Project>,
-    traverse: &mut Option<Traverse>,
-    exact: &Exact<f32>,
-    table: &Arc<Lookup>,
-    wait: bool,
-) -> Result<()> {
-    let gpu = match (project, traverse) {
-        (Some(project), _) => {
-            project.prepare_table(exact, Some(table))?;
-            project.gpu()
-        }
-        (None, Some(traverse)) => {
-            traverse.prepare_table(exact, Some(table))?;
-            traverse.gpu()
-        }
-        (None, None) => return Err(Error::Device("there is no device to build a table".into())),
-    };
-    if wait { gpu.wait() } else { Ok(()) }
-}
-
 /// Everything that a frame depends on.
 struct Frame<'a> {
     mesh: &'a Loaded,
@@ -520,41 +491,11 @@ struct Frame<'a> {
     exact: &'a Exact<f32>,
     table: Option<&'a Arc<Lookup>>,
     view: &'a View,
+    switches: &'a Switches,
     progress: &'a Progress<'a>,
 }
 
 impl Frame<'_> {
-    fn render<const N: usize>(
-        &self,
-        values: &Values<N>,
-        device: &mut Option<Traverse>,
-    ) -> Result<(Image, cpu::Counts, Option<f64>)> {
-        let geometry = &self.mesh.geometry;
-        // Rays that a device leaves to the CPU are exact where that alone has the table.
-        let table = self.table.map(|t| &**t).filter(|t| t.source().is_none());
-        let integral = Integral { exact: self.exact, table };
-        let pixel = |v: &[f32; N]| self.largest(v);
-        let Some(traverse) = device else {
-            let (image, counts) = cpu::render(geometry, values, integral, &pixel, self.view, self.progress);
-            return Ok((image, counts, None));
-        };
-        let mut drawn = traverse.render(geometry, values, self.exact, self.table, self.view)?;
-        let unfinished = Traverse::unfinished(&drawn.pixels);
-        if self.view.blend() == Blend::Maximum {
-            drawn
-                .pixels
-                .par_iter_mut()
-                .for_each(|p| *p = Traverse::largest(p).map_or([0.0; 4], |v: [f32; N]| pixel(&v)));
-        }
-        let by_cpu = cpu::render_pixels(geometry, values, integral, &pixel, self.view, &unfinished);
-        unfinished.iter().zip(by_cpu).for_each(|(&i, p)| drawn.pixels[i] = p);
-        drawn.counts.unfinished = unfinished.len() as u64;
-        let _ = (self.progress)(1.0);
-        let mut image = Image::new(self.view.size());
-        image.pixels = drawn.pixels;
-        Ok((image, drawn.counts, drawn.device_ms))
-    }
-
     /// The pixel of a ray whose largest values are `v`: colour and opacity there, premultiplied.
     fn largest<const N: usize>(&self, v: &[f32; N]) -> [f32; 4] {
         let own = |k: usize| self.field.normal()[k].invert(f64::from(v[k]));

@@ -43,9 +43,18 @@ impl Prepared {
     pub(super) fn fit(&mut self, mesh: &Loaded, transfer: &TransferFunction, tables: bool) -> Result<bool> {
         let changed = self.chooser.choose(transfer, tables);
         if changed {
-            self.values = AnyValues::new(mesh, &self.field, self.chooser.normal())?;
+            self.bring_to(mesh)?;
         }
         Ok(changed)
+    }
+
+    /// Brings the values into the order of `mesh`.
+    ///
+    /// # Errors
+    /// Those of [`Values::new`].
+    pub(super) fn bring_to(&mut self, mesh: &Loaded) -> Result<()> {
+        self.values = AnyValues::new(mesh, &self.field, self.chooser.normal())?;
+        Ok(())
     }
 
     pub(super) fn kind(&self) -> Kind {

@@ -190,7 +190,7 @@ fn pictures_do_not_depend_on_who_finds_the_order() {
         renderer.set_switches(Switches { order, ..Switches::default() });
         for (i, view) in views.iter().enumerate() {
             let [host, device] = [false, true].map(|on_device| {
-                renderer.project().unwrap().sort_on_device(on_device);
+                renderer.backend().project().unwrap().sort_on_device(on_device);
                 let image = renderer.render(view, &|_| ()).unwrap();
                 (image, renderer.stats().projection.unwrap().drawn_cells)
             });
@@ -215,7 +215,7 @@ fn a_lost_device_is_survived() {
     let (mut renderer, view) = prepared(Engine::Project, chosen(&gpu), 4, [24, 24]);
     let before = renderer.render(&view, &|_| ()).unwrap();
     for _ in 0..3 {
-        renderer.project().unwrap().gpu().device.destroy();
+        renderer.backend().project().unwrap().gpu().device.destroy();
         assert!(renderer.render(&view, &|_| ()).unwrap() == before);
         assert_eq!(renderer.stats().device, "gpu");
     }
@@ -236,7 +236,7 @@ fn ten_million_tetrahedra_are_drawn() {
     project.set_transfer(&everything);
     traverse.set_transfer(&everything);
     let (got, want) = (project.render(&view, &|_| ()).unwrap(), traverse.render(&view, &|_| ()).unwrap());
-    let bindings: usize = project.project().unwrap().arrays().unwrap().iter().map(|a| a.chunks).sum();
+    let bindings: usize = project.backend().project().unwrap().arrays().unwrap().iter().map(|a| a.chunks).sum();
     let drawn = project.stats().projection.unwrap().drawn_cells;
     let error = got.compare(&want).unwrap();
     eprintln!("{bindings} bindings, {drawn} cells, error {:e}, {:?}", error.max, project.stats());

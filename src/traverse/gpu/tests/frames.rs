@@ -101,7 +101,7 @@ fn a_lost_device_is_survived() {
     let view = random_view(&mut random, [24, 24]);
     let before = draw(&mut renderer, &view);
     for _ in 0..3 {
-        renderer.device().unwrap().gpu().device.destroy();
+        renderer.backend().traverse().unwrap().gpu().device.destroy();
         assert_eq!(draw(&mut renderer, &view), before);
         assert_eq!(renderer.stats().device, "gpu");
     }
@@ -117,10 +117,10 @@ fn the_budget_is_kept() {
     renderer.set_field(&Field::new(&mesh, "scalar", None, Component::All).unwrap()).unwrap();
     renderer.set_transfer(&random_transfer(&mut random, false));
     let view = random_view(&mut random, [24, 24]);
-    renderer.device().unwrap().gpu.budget = 10_000;
+    renderer.backend().traverse().unwrap().gpu.budget = 10_000;
     let refused = renderer.render(&view, &|_| ());
     assert!(matches!(refused, Err(Error::Memory { allowed: 10_000, .. })), "{refused:?}");
-    renderer.device().unwrap().gpu.budget = 1 << 30;
+    renderer.backend().traverse().unwrap().gpu.budget = 1 << 30;
     draw(&mut renderer, &view);
 }
 

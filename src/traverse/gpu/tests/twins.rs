@@ -153,7 +153,7 @@ fn ten_million_tetrahedra_are_drawn() {
     eprintln!("{:#?}", renderer.stats());
     draw(&mut renderer, &view);
     eprintln!("again {} ms", renderer.stats().frame_ms);
-    renderer.device().unwrap();
+    renderer.backend().traverse().unwrap();
     renderer.draw_on_cpu(&Error::Render("to compare".into()));
     let want = draw(&mut renderer, &view);
     eprintln!("cpu {} ms", renderer.stats().frame_ms);

@@ -1,0 +1,173 @@
+//! What draws a renderer's frames: one variant for each engine and where it runs. An engine is added by a variant here, and by
+//! what it does in each of these methods.
+
+use super::Frame;
+use super::stats::ProjectionStats;
+use crate::error::{Error, Result};
+use crate::geometry::Values;
+use crate::gpu::{DeviceChoice, Gpu, Part};
+use crate::integral::{Exact, Integral, Lookup};
+use crate::project::{self, gpu::Project};
+use crate::render::Engine;
+use crate::traverse::cpu;
+use crate::traverse::gpu::Traverse;
+use crate::view::Blend;
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// An engine, and where it runs.
+#[derive(Debug)]
+pub(crate) enum Backend {
+    /// The walk on the CPU.
+    Walk,
+    /// The walk on a device.
+    WalkOnDevice(Box<Traverse>),
+    /// Projected cells on a device.
+    ProjectOnDevice(Box<Project>),
+}
+
+/// A frame, and what it took.
+#[derive(Debug, Default)]
+pub(super) struct Drawn {
+    pub(super) pixels: Vec<[f32; 4]>,
+    /// What walks did.
+    pub(super) counts: cpu::Counts,
+    /// By the device's own clock, in ms.
+    pub(super) device_ms: Option<f64>,
+    /// What a projection did.
+    pub(super) projection: Option<ProjectionStats>,
+}
+
+impl Backend {
+    /// The backend of `engine` on the chosen device. Where nobody named a device and none can be opened, the CPU draws.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if the device is none of this machine's or cannot be used, or if the engine needs one and there
+    /// is none.
+    pub(super) fn open(engine: Engine, choice: &DeviceChoice) -> Result<Self> {
+        if engine == Engine::Project {
+            return Ok(Backend::ProjectOnDevice(Box::new(Project::open(choice)?)));
+        }
+        let device = match Gpu::open(choice) {
+            Err(e) if *choice == DeviceChoice::Auto => {
+                tracing::warn!("drawing on the CPU: {e}");
+                None
+            }
+            opened => opened?,
+        };
+        Ok(device.map_or(Backend::Walk, |gpu| Backend::WalkOnDevice(Box::new(Traverse::new(gpu)))))
+    }
+
+    #[cfg(test)]
+    pub(crate) fn traverse(&mut self) -> Option<&mut Traverse> {
+        if let Backend::WalkOnDevice(traverse) = self { Some(traverse) } else { None }
+    }
+
+    #[cfg(test)]
+    pub(crate) fn project(&mut self) -> Option<&mut Project> {
+        if let Backend::ProjectOnDevice(project) = self { Some(project) } else { None }
+    }
+
+    /// What draws where no device does any more.
+    pub(super) fn without_device() -> Self {
+        Backend::Walk
+    }
+
+    /// The name of the engine, as [`super::Stats`] has it.
+    pub(super) fn engine(&self) -> &'static str {
+        match self {
+            Backend::Walk | Backend::WalkOnDevice(_) => "traverse",
+            Backend::ProjectOnDevice(_) => "project",
+        }
+    }
+
+    /// The device that draws; none if it is the CPU.
+    pub(super) fn gpu(&self) -> Option<&Gpu> {
+        match self {
+            Backend::Walk => None,
+            Backend::WalkOnDevice(traverse) => Some(traverse.gpu()),
+            Backend::ProjectOnDevice(project) => Some(project.gpu()),
+        }
+    }
+
+    /// Whether the CPU may take the place of a device that fails, if nobody named it.
+    pub(super) fn may_fall_back(&self) -> bool {
+        matches!(self, Backend::WalkOnDevice(_))
+    }
+
+    /// Whether it reads the neighbours of cells and the boundary.
+    pub(super) fn needs_neighbours(&self) -> bool {
+        !matches!(self, Backend::ProjectOnDevice(_))
+    }
+
+    /// Takes `part` for changed.
+    pub(super) fn forget(&mut self, part: Part) {
+        match self {
+            Backend::Walk => {}
+            Backend::WalkOnDevice(traverse) => traverse.forget(part),
+            Backend::ProjectOnDevice(project) => project.forget(part),
+        }
+    }
+
+    /// Has the device that draws hold `table`, or build it; `wait`s until that is done.
+    pub(super) fn hold(&mut self, exact: &Exact<f32>, table: &Arc<Lookup>, wait: bool) -> Result<()> {
+        let gpu = match self {
+            Backend::Walk => return Err(Error::Device("there is no device to build a table".into())),
+            Backend::WalkOnDevice(traverse) => {
+                traverse.prepare_table(exact, Some(table))?;
+                traverse.gpu()
+            }
+            Backend::ProjectOnDevice(project) => {
+                project.prepare_table(exact, Some(table))?;
+                project.gpu()
+            }
+        };
+        if wait { gpu.wait() } else { Ok(()) }
+    }
+
+    /// Draws a frame on the current rayon pool.
+    pub(super) fn draw<const N: usize>(&mut self, frame: &Frame, values: &Values<N>) -> Result<Drawn> {
+        match self {
+            Backend::Walk => Ok(walk(frame, values)),
+            Backend::WalkOnDevice(traverse) => walk_on(traverse, frame, values),
+            Backend::ProjectOnDevice(project) => project_on(project, frame, values),
+        }
+    }
+}
+
+/// The integral as the CPU reads it: exact where a device alone has the table.
+fn integral<'a>(frame: &Frame<'a>) -> Integral<'a> {
+    Integral { exact: frame.exact, table: frame.table.map(|t| &**t).filter(|t| t.source().is_none()) }
+}
+
+fn walk<const N: usize>(frame: &Frame, values: &Values<N>) -> Drawn {
+    let pixel = |v: &[f32; N]| frame.largest(v);
+    let geometry = &frame.mesh.geometry;
+    let (image, counts) = cpu::render(geometry, values, integral(frame), &pixel, frame.view, frame.progress);
+    Drawn { pixels: image.pixels, counts, ..Drawn::default() }
+}
+
+fn walk_on<const N: usize>(traverse: &mut Traverse, frame: &Frame, values: &Values<N>) -> Result<Drawn> {
+    let geometry = &frame.mesh.geometry;
+    let pixel = |v: &[f32; N]| frame.largest(v);
+    let mut drawn = traverse.render(geometry, values, frame.exact, frame.table, frame.view)?;
+    let unfinished = Traverse::unfinished(&drawn.pixels);
+    if frame.view.blend() == Blend::Maximum {
+        drawn.pixels.par_iter_mut().for_each(|p| *p = Traverse::largest(p).map_or([0.0; 4], |v: [f32; N]| pixel(&v)));
+    }
+    let by_cpu = cpu::render_pixels(geometry, values, integral(frame), &pixel, frame.view, &unfinished);
+    unfinished.iter().zip(by_cpu).for_each(|(&i, p)| drawn.pixels[i] = p);
+    drawn.counts.unfinished = unfinished.len() as u64;
+    let _ = (frame.progress)(1.0);
+    Ok(Drawn { pixels: drawn.pixels, counts: drawn.counts, device_ms: drawn.device_ms, projection: None })
+}
+
+fn project_on<const N: usize>(project: &mut Project, frame: &Frame, values: &Values<N>) -> Result<Drawn> {
+    let Frame { mesh, exact, table, view, switches, .. } = frame;
+    let (pixels, counts) = project.render(&mesh.geometry, values, exact, *table, view, switches)?;
+    let _ = (frame.progress)(1.0);
+    let project::Counts { cells, order_ms, project_ms, draw_ms, fragments } = counts;
+    let stats = ProjectionStats { drawn_cells: cells, order_ms, project_ms, draw_ms, fragments };
+    let device_ms = project_ms.zip(draw_ms).map(|(p, d)| p + d);
+    Ok(Drawn { pixels, device_ms, projection: Some(stats), ..Drawn::default() })
+}
