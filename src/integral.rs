@@ -215,7 +215,9 @@ impl<R: Real> Exact<R> {
             Emission::Chromatic => 1.0,
         };
         let last = normal[kind.components() - 1];
-        let colored = |s: f64, side: Side| sample(transfer.color(), transfer.clamp(), s, side).map(|c| (c * emission).min(BRIGHTEST));
+        let colored = |s: f64, side: Side| {
+            sample(transfer.color(), transfer.clamp(), s, side).map(|c| (c * emission).min(BRIGHTEST))
+        };
         let extinction = extinction(transfer, OPAQUE_EXTINCTION * scale);
         let mut places: Vec<f64> = extinction.iter().map(|k| k.0).collect();
         if kind == Kind::Scalar {

@@ -116,9 +116,9 @@ impl Needs {
         }
         let ends = self.needs.iter().flat_map(|n| [n[0], n[1]]);
         // A place itself, if one is as good: what is there is then told exactly.
-        let middle = ends.filter(|s| (a..=b).contains(s)).fold(a / 2.0 + b / 2.0, |best, s| {
-            if self.blur(s) <= self.blur(best) { s } else { best }
-        });
+        let middle = ends
+            .filter(|s| (a..=b).contains(s))
+            .fold(a / 2.0 + b / 2.0, |best, s| if self.blur(s) <= self.blur(best) { s } else { best });
         let half = (hi - middle).max(middle - lo);
         Normal { mid: middle, half: if half > 0.0 { half } else { 1.0 } }
     }
@@ -184,7 +184,8 @@ impl Chooser {
         let mut changed = false;
         for (k, functions) in functions {
             let needs = Needs::new(&functions, transfer.clamp(), self.range[k], &self.samples[k]);
-            let (now, fits) = (needs.blur(self.normal[k].mid), needs.fit(self.normal[k], if tables { 1.0 } else { WIDEST }));
+            let (now, fits) =
+                (needs.blur(self.normal[k].mid), needs.fit(self.normal[k], if tables { 1.0 } else { WIDEST }));
             if fits && now <= SHARP {
                 continue;
             }

@@ -55,10 +55,8 @@ impl<R: Real> Knots<R> {
         let slope = (0..knots.len())
             .map(|i| match knots.get(i + 1) {
                 Some(next) if s[i] < s[i + 1] => {
-                    {
-                        let slope = |k: usize| (next.1[k] - knots[i].1[k]) / (next.0 - knots[i].0);
-                        [0, 1, 2, 3].map(|k| R::of(slope(k).clamp(-STEEPEST, STEEPEST)))
-                    }
+                    let slope = |k: usize| (next.1[k] - knots[i].1[k]) / (next.0 - knots[i].0);
+                    [0, 1, 2, 3].map(|k| R::of(slope(k).clamp(-STEEPEST, STEEPEST)))
                 }
                 _ => [R::of(0.0); 4],
             })

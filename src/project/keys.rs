@@ -168,7 +168,9 @@ pub(super) fn keys<const N: usize>(
         // In f64, which spheres of slivers and of cells far away ask for.
         let (eye, parallel) = (seen.eye.unwrap_or_default(), seen.eye.is_none().then_some(seen.direction));
         let power = |cell: &Cell| power(cell.corners.map(|c| geometry.points[c as usize] - eye), parallel);
-        return ranked(cells.map(|(i, cell)| Some(count(i, cell)).filter(|&n| n > 0).map(|n| (power(cell), n))).collect());
+        return ranked(
+            cells.map(|(i, cell)| Some(count(i, cell)).filter(|&n| n > 0).map(|n| (power(cell), n))).collect(),
+        );
     }
     let key = |(i, cell): (usize, &Cell)| {
         let count = count(i, cell);

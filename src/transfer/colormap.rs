@@ -109,7 +109,9 @@ impl ColorMap {
     pub fn over(&self, range: [f64; 2]) -> Vec<(f64, [f64; 3])> {
         if self.log && range[0] <= 0.0 {
             let [lo, hi] = range;
-            tracing::warn!("the colour map is for logarithms, which values from {lo} to {hi} have none of: it is linear");
+            tracing::warn!(
+                "the colour map is for logarithms, which values from {lo} to {hi} have none of: it is linear"
+            );
         }
         self.spread(&self.points, range)
     }
