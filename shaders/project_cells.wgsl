@@ -57,7 +57,7 @@ fn values_of(cell: u32, corners: vec4u) -> array<Value, 4> {
 
 /// The end of a bin below `s`, one further than needed: rounding.
 fn end_below(s: f32) -> i32 {
-    return clamp(i32((s + 1.0) * (f32(BINS) / 2.0)) - 1, 0, i32(BINS) - 1);
+    return max(i32(clamp((s + 1.0) * (f32(BINS) / 2.0), 0.0, f32(BINS))) - 1, 0);
 }
 
 /// Whether the function shows anything of a cell whose values are between two.
@@ -70,7 +70,7 @@ fn line_at(low: f32, high: f32) -> u32 {
     var i = bins[end_below(low)].y;
     var ends = ends_of(i);
     loop {
-        // No value is above 1, but this ends whatever is one.
+        // No knot is above 1, but this ends whatever is one.
         if ends.y > min(low, 2.0) {
             break;
         }

@@ -33,8 +33,8 @@ const BETTER: f64 = 4.0;
 /// What an f32 may be off, relative to itself.
 const ROUNDING: f64 = 1.0 / (1u64 << 24) as f64;
 
-/// Normalised, knots are within ±this where no table is asked for, which has room for ±1 only.
-const WIDEST: f64 = 8.0;
+/// Of ±1, how much a map leaves to knots that move apart in edits, where no table is asked for, which has few texels.
+const ROOM: f64 = 2.0;
 
 impl Normal {
     /// The map of `[lo, hi]` to [−1, 1].
@@ -97,8 +97,8 @@ impl Needs {
         self.needs.iter().fold([f64::MAX, f64::MIN], |[lo, hi], n| [lo.min(n[0]), hi.max(n[1])])
     }
 
-    /// The map that blurs least, and maps all places to [−1, 1].
-    fn best(&self) -> Normal {
+    /// The map that blurs least, and maps all places to ±1/`room`.
+    fn best(&self, room: f64) -> Normal {
         let [lo, hi] = self.hull();
         // `blur` is the greatest of convex functions, so it has one valley.
         let (mut a, mut b) = (lo, hi);
@@ -120,13 +120,13 @@ impl Needs {
             .filter(|s| (a..=b).contains(s))
             .fold(a / 2.0 + b / 2.0, |best, s| if self.blur(s) <= self.blur(best) { s } else { best });
         let half = (hi - middle).max(middle - lo);
-        Normal { mid: middle, half: if half > 0.0 { half } else { 1.0 } }
+        Normal { mid: middle, half: if half > 0.0 { half * room } else { 1.0 } }
     }
 
-    /// Whether all places are within ±`widest` under `normal`.
-    fn fit(&self, normal: Normal, widest: f64) -> bool {
+    /// Whether all places are within ±1 under `normal`.
+    fn fit(&self, normal: Normal) -> bool {
         let [lo, hi] = self.hull();
-        self.needs.is_empty() || (normal.apply(lo) >= -widest && normal.apply(hi) <= widest)
+        self.needs.is_empty() || (normal.apply(lo) >= -1.0 && normal.apply(hi) <= 1.0)
     }
 }
 
@@ -171,8 +171,8 @@ impl Chooser {
         &self.normal
     }
 
-    /// Chooses other maps if the values under the present ones are not told apart well enough for `transfer`, or, where
-    /// `tables` may be read, are not in their range. True if one has changed.
+    /// Chooses other maps if the values under the present ones are not told apart well enough for `transfer`, or not
+    /// all that it tells is within ±1; with less room to spare where `tables` may be read. True if one has changed.
     pub(crate) fn choose(&mut self, transfer: &TransferFunction, tables: bool) -> bool {
         let color: Vec<f64> = transfer.color().iter().map(|k| k.0).collect();
         let opacity: Vec<f64> = transfer.opacity().iter().map(|k| k.0).collect();
@@ -184,12 +184,11 @@ impl Chooser {
         let mut changed = false;
         for (k, functions) in functions {
             let needs = Needs::new(&functions, transfer.clamp(), self.range[k], &self.samples[k]);
-            let (now, fits) =
-                (needs.blur(self.normal[k].mid), needs.fit(self.normal[k], if tables { 1.0 } else { WIDEST }));
+            let (now, fits) = (needs.blur(self.normal[k].mid), needs.fit(self.normal[k]));
             if fits && now <= SHARP {
                 continue;
             }
-            let best = needs.best();
+            let best = needs.best(if tables { 1.0 } else { ROOM });
             if !fits || needs.blur(best.mid) * BETTER < now {
                 changed |= self.normal[k] != best;
                 self.normal[k] = best;
@@ -226,4 +225,69 @@ fn too_close(knots: &[(f64, f64)], normal: Normal, [lo, hi]: [f64; 2]) -> Option
         let turns = !around.windows(2).all(|w| w[0].1 <= w[1].1) && !around.windows(2).all(|w| w[0].1 >= w[1].1);
         (unclear && turns).then_some([s0, s1])
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn needs(places: &[f64]) -> Needs {
+        Needs::new(&[places.to_vec()], true, [-1e30, 1e30], &[0.0, 0.25, 0.5, 0.75, 1.0])
+    }
+
+    #[test]
+    fn a_map_is_for_what_is_close_together() {
+        let even = needs(&[0.0, 1.0, 2.0, 3.0]).best(1.0);
+        assert!((even.mid - 1.5).abs() < 1e-6 && (even.half - 1.5).abs() < 1e-6, "{even:?}");
+        let peak = needs(&[-2.0, 0.1, 0.1 + 1e-9, 0.1 + 2e-9, 2.0]);
+        let best = peak.best(1.0);
+        assert!((best.mid - 0.1).abs() < 1e-7 && peak.fit(best) && peak.blur(best.mid) < 1e-6, "{best:?}");
+        let far = needs(&[0.0, 0.25, 0.5, 1e6]);
+        assert!(far.blur(far.best(1.0).mid) < 1e-7 && far.blur(Normal::new(0.0, 1e6).mid) > 1e-2);
+        // A step says where it is, and is told from the values around it.
+        let step = needs(&[0.4, 0.4]);
+        assert_eq!(step.best(1.0), Normal { mid: 0.4, half: 1.0 });
+        assert!(step.blur(-1e9) > 1.0);
+        // Nothing to tell.
+        assert_eq!(needs(&[0.4]).blur(1e30), 0.0);
+    }
+
+    #[test]
+    fn only_what_turns_is_too_close() {
+        let normal = Normal::new(0.0, 1.0);
+        let of = |knots: &[(f64, f64)]| too_close(knots, normal, [0.0, 1.0]);
+        assert_eq!(of(&[(0.0, 0.0), (0.9, 0.0), (0.9 + 1e-9, 1.0), (1.0, 1.0)]), None);
+        let peak = [(0.0, 0.0), (0.9, 0.0), (0.9 + 1e-9, 1.0), (0.9 + 2e-9, 0.0), (1.0, 0.0)];
+        assert_eq!(of(&peak), Some([0.9, 0.9 + 1e-9]));
+        assert_eq!(too_close(&peak, normal, [0.0, 0.5]), None);
+        assert_eq!(too_close(&peak, Normal { mid: 0.9, half: 1.0 }, [0.0, 1.0]), None);
+    }
+
+    #[test]
+    fn what_is_finite_stays_so() {
+        let normal = Normal::new(-1.0, 1.0);
+        for s in [1e38, -1e38, f64::MAX, f64::MIN] {
+            assert_eq!(normal.bounded(s, MOST), (MOST * s.signum()) as f32);
+        }
+        for s in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            assert!(!normal.bounded(s, MOST).is_finite());
+        }
+        assert_eq!(Normal::new(f64::MIN, f64::MAX).bounded(f64::MAX, MOST), 1.0);
+    }
+
+    proptest! {
+        #[test]
+        fn no_knot_is_a_better_middle(
+            mut places in prop::collection::vec((-30..30i32, -1.0..1.0f64).prop_map(|(e, m)| m * f64::from(e).exp2()), 2..30),
+        ) {
+            places.sort_by(f64::total_cmp);
+            let needs = needs(&places);
+            let best = needs.best(1.0);
+            prop_assert!(needs.fit(best));
+            for &s in &places {
+                prop_assert!(needs.blur(best.mid) <= needs.blur(s) * 1.001 + 1e-30, "{best:?}, {s}");
+            }
+        }
+    }
 }

@@ -85,7 +85,7 @@ fn range_of<const N: usize>(v: [[f32; N]; 4]) -> Option<[f32; 2]> {
 /// In how many parts a cell is drawn whose values are in a range, of which `bins` tell what is seen; 0 if nothing is.
 fn parts_of([low, high]: [f32; 2], bins: &[lines::End], parts: Parts) -> u32 {
     // One further than needed: rounding.
-    let end_below = |s: f32| (((s + 1.0) * (BINS as f32 / 2.0)) as i32 - 1).clamp(0, BINS as i32 - 1) as usize;
+    let end_below = |s: f32| (((s + 1.0) * (BINS as f32 / 2.0)).clamp(0.0, BINS as f32) as usize).saturating_sub(1);
     let (below, above) = (bins[end_below(low)], bins[(end_below(high) + 3).min(BINS)]);
     match parts {
         _ if above.shown == below.shown => 0,
