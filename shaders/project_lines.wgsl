@@ -34,18 +34,18 @@ fn by_lookups(front: Value, back: Value, length: f32, first: u32) -> vec4f {
     let share = 1.0 / select(range, 1.0, range == 0.0);
     var sum = vec4f(0.0, 0.0, 0.0, 1.0);
     var i = first;
-    var from = low;
+    var start = low;
     loop {
         let line = line_at_number(i);
         let is_last = high < line.ends.y;
-        let to = select(clamp(line.ends.y, from, high), high, is_last);
-        let part = select((to - from) * share, select(0.0, 1.0, is_last), range == 0.0);
-        let a = line.value + line.slope * (clamp(from, line.ends.x, line.ends.y) - line.ends.x);
+        let to = select(clamp(line.ends.y, start, high), high, is_last);
+        let part = select((to - start) * share, select(0.0, 1.0, is_last), range == 0.0);
+        let a = line.value + line.slope * (clamp(start, line.ends.x, line.ends.y) - line.ends.x);
         let b = line.value + line.slope * (clamp(to, line.ends.x, line.ends.y) - line.ends.x);
         var f = select(b, a, rises);
         var r = select(a, b, rises);
         if RGBA {
-            let u = (from - low) * share;
+            let u = (start - low) * share;
             let next = select((to - low) * share, 1.0, is_last);
             let ends = select(vec2f(1.0 - next, 1.0 - u), vec2f(u, next), rises);
             f = vec4f(f.x, mix(color_of(front), color_of(back), ends.x) * function.scale);
@@ -61,7 +61,7 @@ fn by_lookups(front: Value, back: Value, length: f32, first: u32) -> vec4f {
             break;
         }
         i++;
-        from = to;
+        start = to;
     }
     return vec4f(sum.xyz, 1.0 - sum.w);
 }

@@ -56,12 +56,12 @@ fn with_outliers(scene: &Scene, size: f64, all: bool) -> Scene {
 
 fn view(blend: Blend) -> View {
     let projection = Projection::Perspective { view_angle: 30.0 };
-    draw::camera(dvec3(2.4, 1.7, 2.9), DVec3::ZERO, DVec3::Y, projection).with_blend(blend)
+    draw::camera(dvec3(2.4137, 1.7291, 2.8873), dvec3(0.011, -0.017, 0.013), DVec3::Y, projection).with_blend(blend)
 }
 
-/// Looks whose pictures do not change with what values are rounded by.
+/// Looks whose pictures do not change with what values are rounded by, nor with how rays graze a cell.
 fn looks() -> Vec<&'static Look> {
-    let steep = |l: &&Look| l.convention == Convention::Opacity && l.peak >= 1.0;
+    let steep = |l: &&Look| l.peak >= 1e3 || l.convention == Convention::Opacity && l.peak >= 1.0;
     LOOKS.iter().filter(|l| !steep(l)).collect()
 }
 
@@ -168,32 +168,28 @@ fn knots_may_be_anywhere() {
     let spike = |s: f64, w: f64, a: f64| vec![(-2.0, 0.0), (s - w, 0.0), (s, a), (s + w, 0.0), (2.0, 0.0)];
     let steps = vec![(0.0, 0.0), (0.2, 0.0), (0.2, 1.0), (0.5, 1.0), (0.5, 0.1), (1.0, 0.3), (1.0, 0.0), (1e6, 4.0)];
     let bands = vec![(0.0, [1.0, 0.0, 0.0]), (0.3, [1.0, 0.0, 0.0]), (0.3, [0.0, 1.0, 0.0]), (1e6, [1.0, 1.0, 0.0])];
-    // Powers of two, so that these are exact.
+    // Powers of two, so that these are exact: the same picture as in units of them, where the reference has all digits.
     let tiny = 2f64.powi(-40);
-    let near_one = at_points.iter().map(|v| 1.0 + ((v * 64.0).round() / 64.0) * tiny).collect();
-    let near = |knots: Vec<(f64, f64)>| knots.into_iter().map(|(s, a)| (1.0 + s * tiny, a)).collect::<Vec<_>>();
+    let rounded: Vec<f64> = at_points.iter().map(|v| (v * 64.0).round() / 64.0).collect();
+    let near_one = rounded.iter().map(|v| 1.0 + v * tiny).collect();
+    let bumps = [(-1.0, 0.0), (0.25, 1.0), (0.5, 0.0), (1.0, 0.6)];
+    let plain = scene_of(&mesh, rounded, Association::Point, of(color(0.0, 1.0), bumps.to_vec(), 0.4));
+    let near = bumps.map(|(s, a)| (1.0 + s * tiny, a)).to_vec();
     let two = (0..mesh.cells().len()).map(|i| if i % 9 == 0 { 1e20 } else { 0.3 }).collect();
     let (point, cell) = (Association::Point, Association::Cell);
     let scenes = [
         ("a narrow peak", scene_of(&mesh, at_points.clone(), point, of(color(0.1, 1.0), spike(0.1, 1e-7, 1e5), 0.2))),
         ("a narrower peak", scene_of(&mesh, at_points, point, of(color(-0.7, 0.1), spike(-0.7, 1e-10, 1e8), 0.2))),
         ("steps and jumps", scene_of(&mesh, at_cells, cell, of(bands, steps, 0.1))),
-        (
-            "a tiny range",
-            scene_of(
-                &mesh,
-                near_one,
-                point,
-                of(color(1.0, tiny), near(vec![(-1.0, 0.0), (0.25, 1.0), (0.5, 0.0), (1.0, 0.6)]), 0.4),
-            ),
-        ),
+        ("a tiny range", scene_of(&mesh, near_one, point, of(color(1.0, tiny), near, 0.4))),
         ("one step", scene_of(&mesh, two, cell, of(vec![(0.0, [0.5; 3])], vec![(0.5, 0.0), (0.5, 1.0)], 0.4))),
     ];
     let mut device = common::on_device(render::Engine::Traverse);
     let mut report = Report::default();
     for (case, scene) in scenes {
         let view = view(Blend::Composite);
-        let expected = Engine::Reference.image(&scene, &view);
+        let judged = if case == "a tiny range" { &plain } else { &scene };
+        let expected = Engine::Reference.image(judged, &view);
         assert!(expected.pixels.iter().any(|p| p[3] > 0.01), "{case}: there is something to see");
         for engine in ENGINES {
             report.hold(&format!("{engine:?}, {case}"), &engine.image(&scene, &view), &expected, BOUND);
@@ -384,7 +380,7 @@ fn what_users_met_is_right() {
 /// Values are as the array has them, whatever their type, and outliers do not stretch them.
 #[test]
 fn a_field_keeps_its_values() {
-    let mesh = generate::tetrahedra(1);
+    let mesh = generate::tetrahedra(3);
     let n = mesh.points().len();
     let mut values: Vec<f64> = (0..n).map(|i| 1.0 + i as f64 * 1e-13).collect();
     values[0] = -1e300;
