@@ -215,18 +215,26 @@ impl<const N: usize> Values<N> {
     }
 }
 
-/// The least and the greatest eigenvalue of a symmetric matrix (Smith 1961).
+/// The least and the greatest eigenvalue of a symmetric matrix, by Jacobi's rotations (1846).
 fn outer_eigenvalues(m: DMat3) -> [f64; 2] {
-    let mean = (m.x_axis.x + m.y_axis.y + m.z_axis.z) / 3.0;
-    let rest = m - DMat3::from_diagonal(DVec3::splat(mean));
-    let square = rest.x_axis.length_squared() + rest.y_axis.length_squared() + rest.z_axis.length_squared();
-    let p = (square / 6.0).sqrt();
-    if p <= 0.0 {
-        return [mean; 2];
+    let mut a = m.to_cols_array_2d();
+    for (p, q) in [(0, 1), (0, 2), (1, 2)].into_iter().cycle().take(36) {
+        if a[p][q] == 0.0 {
+            continue;
+        }
+        let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
+        let t = theta.signum() / (theta.abs() + theta.hypot(1.0));
+        let c = 1.0 / t.hypot(1.0);
+        let turned = |x: f64, y: f64| (c * (x - t * y), c * (t * x + y));
+        for row in &mut a {
+            (row[p], row[q]) = turned(row[p], row[q]);
+        }
+        for k in 0..3 {
+            (a[p][k], a[q][k]) = turned(a[p][k], a[q][k]);
+        }
     }
-    let angle = ((rest * (1.0 / p)).determinant() / 2.0).clamp(-1.0, 1.0).acos() / 3.0;
-    let third = std::f64::consts::TAU / 3.0;
-    [mean + 2.0 * p * (angle + third).cos(), mean + 2.0 * p * angle.cos()]
+    let values = [a[0][0], a[1][1], a[2][2]];
+    [values.into_iter().fold(f64::MAX, f64::min), values.into_iter().fold(f64::MIN, f64::max)]
 }
 
 /// Centre and scale that bring what lies between two corners into [−1, 1]³.

@@ -312,8 +312,14 @@ fn very_flat_meshes_are_drawn() {
         let color = vec![(-1.0, [0.1, 0.3, 0.9]), (1.0, [0.9, 0.5, 0.1])];
         let transfer = TransferFunction::new(color, opacity, size.min_element()).unwrap();
         let scene = scene_of(&mesh, values, Association::Point, transfer);
-        let view = view(Blend::Composite);
+        // A needle is seen from its end.
+        let along = Projection::Parallel { parallel_scale: 1.3e-7 };
+        let view = match k {
+            1 => draw::camera(turn * dvec3(3.0, 0.0, 0.0), DVec3::ZERO, turn * dvec3(0.0, 0.8, 0.6), along),
+            _ => view(Blend::Composite),
+        };
         let expected = Engine::Reference.image(&scene, &view);
+        assert!(expected.pixels.iter().filter(|p| p[3] > 0.1).count() > 50, "{k}: there is something to see");
         report.hold(&format!("twin, {k}"), &TWIN.image(&scene, &view), &expected, BOUND);
         for renderer in devices.iter_mut().flatten() {
             set(renderer, &scene);
