@@ -31,7 +31,11 @@ pub(crate) fn restyled(options: &Request, mut scene: Scene, map: Option<ColorMap
     let old = &scene.transfer;
     let (first, last) = (old.color()[0].0, old.color()[old.color().len() - 1].0);
     let range = options.range.unwrap_or([first, last]);
-    let axis = if options.log { Axis::logarithmic(range)? } else { Axis::linear(range) };
+    let axis = match &map {
+        _ if options.log => Axis::logarithmic(range)?,
+        Some(map) => map.axis(range),
+        None => Axis::linear(range),
+    };
     // A range, or logarithms, move both functions; opacity knots may lie outside the range of the colours.
     let moves = last > first && (options.log || options.range.is_some());
     let place = |s: f64| (s - first) / (last - first);

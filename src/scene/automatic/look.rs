@@ -66,7 +66,7 @@ impl Sample {
         let n = field.kind().components();
         let values = match field.association() {
             Association::Point => tetrahedra.values(field.values(), n),
-            Association::Cell => field.values().into(),
+            Association::Cell => field.values(),
         };
         let view = View::new(camera, COARSE).ok();
         let places: Vec<Place> = chosen
@@ -81,17 +81,16 @@ impl Sample {
                     let weights = inside(t + i);
                     let at = |k: usize| match field.association() {
                         Association::Point => {
-                            (0..4).map(|c| weights[c] * f64::from(values[corners[c] as usize * n + k])).sum()
+                            (0..4).map(|c| weights[c] * values[corners[c] as usize * n + k]).sum()
                         }
                         Association::Cell => {
                             let cell = tetrahedra.cell.as_ref().map_or(t, |cell| cell[t] as usize);
-                            f64::from(values[cell * n + k])
+                            values[cell * n + k]
                         }
                     };
-                    let own = |k: usize| field.normal(k).invert(at(k));
                     let point = (0..4).map(|c| points[corners[c] as usize] * weights[c]).sum();
                     let seen = view.as_ref().and_then(|view| seen(view, &camera, point, each));
-                    Place { color: own(0), opacity: own(n - 1), volume: each, seen }
+                    Place { color: at(0), opacity: at(n - 1), volume: each, seen }
                 })
             })
             .collect();
@@ -242,11 +241,11 @@ pub(super) fn transfer(
         let most = hi.max(-lo);
         range = [-most, most];
     }
-    let axis = if wishes.logarithmic { Axis::logarithmic(range)? } else { Axis::linear(range) };
     let map = match &wishes.map {
         Some(map) => map.clone(),
         None => ColorMap::named(if signed { "cool to warm" } else { "viridis" })?,
     };
+    let axis = if wishes.logarithmic { Axis::logarithmic(range)? } else { map.axis(range) };
     let color = match field.kind() {
         // Its colours are its own.
         Kind::Rgba => vec![(0.0, [1.0; 3])],
