@@ -79,6 +79,14 @@ impl Options {
     }
 }
 
+/// `camera`, so many `degrees` further around its view-up axis.
+pub(crate) fn turned(mut camera: Camera, degrees: f64) -> Camera {
+    if let Some(axis) = camera.view_up.try_normalize() {
+        turn(&mut camera, axis, degrees);
+    }
+    camera
+}
+
 /// Turns position and view up around the focal point.
 fn turn(camera: &mut Camera, axis: DVec3, degrees: f64) {
     let by = DQuat::from_axis_angle(axis, degrees.to_radians());
