@@ -411,8 +411,7 @@ mod tests {
     fn unknown_names_are_refused_with_those_that_exist() {
         let message = Session::new(1, "cpu", "magic", Log::default()).unwrap_err().to_string();
         assert!(message.contains("magic") && message.contains("traverse") && message.contains("project"), "{message}");
-        let message = Session::new(1, "cpu", "project", Log::default()).unwrap_err().to_string();
-        assert!(message.contains("graphics device") && message.contains("traverse"), "{message}");
+        assert!(Session::new(1, "cpu", "project", Log::default()).is_ok());
         let message = named::<Form>("integral", "guess").unwrap_err().to_string();
         let known = "\"auto\", \"exact\", \"volume\", \"polynomial\", \"cylindrical\"";
         assert_eq!(message, format!("no integral is called \"guess\"; there are {known}"));

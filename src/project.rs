@@ -4,6 +4,7 @@
 //! without Rendering Artifacts, 2004). It needs no neighbours, so it also draws meshes whose topology moves; and it is
 //! a test bed, in which each published variant can be switched on: [`Switches`] are what differs.
 
+pub(crate) mod cpu;
 mod frame;
 pub(crate) mod gpu;
 mod keys;

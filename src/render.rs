@@ -23,7 +23,7 @@ use crate::view::{Blend, View};
 use backend::{Backend, Drawn};
 use glam::DVec3;
 use prepared::{AnyValues, Prepared};
-pub use stats::{ProjectionStats, Stats};
+pub use stats::{ProjectionStats, Stats, SweepStats};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -497,12 +497,12 @@ impl Renderer {
             self.stats.uploaded_bytes = gpu.uploaded() - uploaded;
             self.stats.device_bytes = gpu.allocated();
         }
-        let Drawn { pixels, counts, device_ms, projection } = drawn;
+        let Drawn { pixels, counts, device_ms, projection, sweep } = drawn;
         self.stats.device_ms = device_ms;
         self.stats.steps = counts.steps;
         self.stats.repaired_rays = counts.repaired;
         self.stats.cpu_rays = counts.unfinished;
-        self.stats.projection = projection;
+        (self.stats.projection, self.stats.sweep) = (projection, sweep);
         self.stats.frame_ms = ms(start);
         self.build_next(late)?;
         Ok(Image { size: view.size(), pixels })

@@ -129,6 +129,12 @@ impl<R: Real> Knots<R> {
         })
     }
 
+    /// The greatest extinction on the intervals from the first to the last of `lines`.
+    pub(crate) fn densest(&self, [first, last]: [u16; 2]) -> R {
+        let on = usize::from(first)..(usize::from(last) + 2).min(self.value.len());
+        self.value[on].iter().fold(R::of(0.0), |most, v| most.max(v[0]))
+    }
+
     /// Whether anything between `low` and `high` has extinction, or, if `direct`, a colour.
     pub(crate) fn shows(&self, low: f32, high: f32, direct: bool) -> bool {
         let channels = if direct { 4 } else { 1 };
@@ -137,6 +143,20 @@ impl<R: Real> Knots<R> {
         let positive = |v: &[R; 4]| v[..channels].iter().any(|&c| c > R::of(0.0));
         // Linear in between: from the knot below to the one above.
         self.value[first..(beyond + 1).min(self.value.len())].iter().any(positive)
+    }
+
+    /// The first and the last interval that values from `low` to `high` are on, both finite.
+    pub(crate) fn intervals(&self, low: R, high: R) -> [usize; 2] {
+        let first = self.interval(low);
+        if low == high {
+            return [self.of_constant(first, low); 2];
+        }
+        let mut last = self.interval(high);
+        // What only ends there is on the interval below.
+        while last > first && self.s[last] >= high {
+            last -= 1;
+        }
+        [first, last]
     }
 
     /// The interval that says what a constant `s` in the interval `i` is: if it is opaque as a single value, it is opaque all

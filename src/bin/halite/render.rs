@@ -531,7 +531,7 @@ pub(crate) fn report(s: &Stats, times: &Times, size: [u32; 2], frame_ms: f64) ->
         "integral": s.integral, "table_ms": s.table_ms, "table_bytes": s.table_bytes, "knots_per_cell": s.knots_per_cell,
         "steps": s.steps, "repaired_rays": s.repaired_rays, "cpu_rays": s.cpu_rays,
         "device_ms": s.device_ms, "uploaded_bytes": s.uploaded_bytes, "device_bytes": s.device_bytes,
-        "peak_bytes": peak_bytes(), "projection": s.projection,
+        "peak_bytes": peak_bytes(), "projection": s.projection, "sweep": s.sweep,
     })
 }
 
