@@ -471,7 +471,6 @@ mod tests {
             if matrix.x_axis.x > 0.0 {
                 assert!(other.set_points(&points, DMat4::IDENTITY).unwrap());
                 assert!(draw(&mut other).compare(&expected).unwrap().max < 2e-5);
-                // Another point, or none, is not finite: cells come and go.
                 assert!(!other.set_points(whole.points(), matrix).unwrap());
                 points.swap(0, 1);
                 assert!(!other.set_points(&points, matrix).unwrap());

@@ -212,7 +212,7 @@ class Program:
 
 
 def test_sequences():
-    first, count = (int(os.environ.get(n, d)) for n, d in (("HALITE_FIRST_SEED", "1"), ("HALITE_SEEDS", "24")))
+    first, count = (int(os.environ.get(n, d)) for n, d in (("HALITE_FIRST_SEED", "1"), ("HALITE_SEEDS", "16")))
     seen = 0
     for seed in range(first, first + count):
         p = Program(seed)
