@@ -141,7 +141,9 @@ fn add<T: Copy>(knots: &mut Vec<(f64, T)>, [step, end]: [f64; 2], value: T, upwa
     let mut outer: Vec<(f64, T)> = Vec::new();
     let edge = if upward { knots[knots.len() - 1] } else { knots[0] };
     if let Some(none) = none {
-        outer.push((edge.0, none));
+        // A hair beyond, so that the last knot's own value keeps what it has.
+        let hair = edge.0 + 1e-5 * (step - edge.0);
+        outer.extend([(hair, edge.1), (hair, none)]);
     }
     outer.extend([(step, none.unwrap_or(edge.1)), (step, value), (end, value)]);
     if upward {

@@ -313,7 +313,7 @@ mod tests {
             );
             (0..4).for_each(|k| sum[k] += w[k] / count as f64);
         }
-        assert!(sum.iter().all(|s| (s - 0.25).abs() < 2e-3), "{sum:?}");
+        assert!(sum.iter().all(|s| (s - 0.25).abs() < 5e-3), "{sum:?}");
     }
 
     /// Whatever values a mesh has, the mean ray is as opaque as it should be.
