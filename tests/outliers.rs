@@ -117,7 +117,7 @@ fn devices_draw_outliers_too() {
             let expected = Engine::Reference.image(&scene, &view(blend));
             set(&mut renderer, &scene);
             let got = renderer.render(&view(blend), &|_| ()).unwrap();
-            report.hold(&case, &got, &expected, if projects { 5e-5 } else { BOUND.max(look.bound(blend)) });
+            report.hold(&case, &got, &expected, 5e-5);
         }
     }
     report.finish("outliers on devices");
@@ -319,7 +319,7 @@ fn very_flat_meshes_are_drawn() {
             _ => view(Blend::Composite),
         };
         let expected = Engine::Reference.image(&scene, &view);
-        assert!(expected.pixels.iter().filter(|p| p[3] > 0.1).count() > 50, "{k}: there is something to see");
+        assert!(expected.pixels.iter().filter(|p| p[3] > 0.1).count() > 5, "{k}: there is something to see");
         report.hold(&format!("twin, {k}"), &TWIN.image(&scene, &view), &expected, BOUND);
         for renderer in devices.iter_mut().flatten() {
             set(renderer, &scene);
