@@ -10,6 +10,8 @@ use std::path::Path;
 pub struct ColorMap {
     points: Vec<(f64, [f64; 3])>,
     opacity: Option<Vec<(f64, f64)>>,
+    /// Whether places are of the values' logarithms.
+    log: bool,
 }
 
 /// The names that [`ColorMap::named`] knows.
@@ -40,7 +42,7 @@ impl ColorMap {
                 return Err(Error::Transfer(format!("no colour map is called \"{name}\"; there are \"{names}\"")));
             }
         };
-        Ok(ColorMap { points, opacity: None })
+        Ok(ColorMap { points, opacity: None, log: false })
     }
 
     /// Reads a preset that ParaView saved (.json): the one called `preset`, or the first in the file.
@@ -71,7 +73,8 @@ impl ColorMap {
         }
         let space = match file.color_space.as_deref().unwrap_or("RGB") {
             "RGB" => Space::Rgb,
-            "HSV" => Space::Hsv,
+            // ParaView's default, unlike VTK's, is not to.
+            "HSV" => Space::Hsv { wrap: file.hsv_wrap.is_some_and(Flag::is_set) },
             "Lab" => Space::Lab,
             "Diverging" => Space::Diverging,
             "Step" => Space::Step,
@@ -81,13 +84,19 @@ impl ColorMap {
                 return Err(Error::unsupported(path, what));
             }
         };
-        let colors = tuples::<3>(&file.rgb_points).map_err(|e| malformed(format!("{what}: RGBPoints {e}")))?;
+        for (name, value) in chosen.as_object().into_iter().flatten() {
+            if !KNOWN.contains(&name.as_str()) && !is_unset(value) {
+                tracing::warn!("{}: {what} says {name}: {value}, which Halite does not do", path.display());
+            }
+        }
+        let log = file.use_log_scale.is_some_and(Flag::is_set);
+        let colors = tuples::<3>(&file.rgb_points, log).map_err(|e| malformed(format!("{what}: RGBPoints {e}")))?;
         let opacity = file
             .points
-            .map(|p| tuples::<3>(&p).map_err(|e| malformed(format!("{what}: Points {e}"))))
+            .map(|p| tuples::<3>(&p, log).map_err(|e| malformed(format!("{what}: Points {e}"))))
             .transpose()?
             .map(|p| opacity_points(&p));
-        Ok(ColorMap { points: color_points(&colors, space), opacity })
+        Ok(ColorMap { points: color_points(&colors, space), opacity, log })
     }
 
     /// The points `(place in [0, 1], [r, g, b])`, ascending.
@@ -95,14 +104,48 @@ impl ColorMap {
         &self.points
     }
 
-    /// The knots of a colour function that has this map over the range from `lo` to `hi`.
-    pub fn over(&self, [lo, hi]: [f64; 2]) -> Vec<(f64, [f64; 3])> {
-        self.points.iter().map(|&(x, c)| (lo + (hi - lo) * x, c)).collect()
+    /// The knots of a colour function that has this map over the range from `lo` to `hi`; of a map over logarithms, if
+    /// both are above 0, and else, with a warning, over the values.
+    pub fn over(&self, range: [f64; 2]) -> Vec<(f64, [f64; 3])> {
+        if self.log && range[0] <= 0.0 {
+            let [lo, hi] = range;
+            tracing::warn!(
+                "the colour map is for logarithms, which values from {lo} to {hi} have none of: it is linear"
+            );
+        }
+        self.spread(&self.points, range)
+    }
+
+    /// `points` over a range.
+    fn spread<const N: usize>(&self, points: &[(f64, [f64; N])], [lo, hi]: [f64; 2]) -> Vec<(f64, [f64; N])> {
+        let place = |x: f64| lo + (hi - lo) * x;
+        if !self.log || lo <= 0.0 || lo >= hi {
+            return points.iter().map(|&(x, c)| (place(x), c)).collect();
+        }
+        let ratio = (hi / lo).ln();
+        let place = |x: f64| if x == 1.0 { hi } else { lo * (ratio * x).exp() };
+        let mut knots: Vec<_> = points.first().map(|&(x, c)| (place(x), c)).into_iter().collect();
+        for w in points.windows(2) {
+            let ((x0, a), (x1, b)) = (w[0], w[1]);
+            let (s0, s1) = (place(x0), place(x1));
+            if x1 <= x0 {
+                knots.push((s1, b));
+                continue;
+            }
+            let at = |u: f64| {
+                let v = (((s0 + (s1 - s0) * u) / s0).ln() / (s1 / s0).ln()).clamp(0.0, 1.0);
+                std::array::from_fn(|k| a[k] + (b[k] - a[k]) * v)
+            };
+            knots.extend(resample(s0, s1, TOLERANCE, &at));
+        }
+        knots.dedup();
+        knots
     }
 
     /// The knots of the opacity function that came with a preset, over the range from `lo` to `hi`.
-    pub fn opacity_over(&self, [lo, hi]: [f64; 2]) -> Option<Vec<(f64, f64)>> {
-        Some(self.opacity.as_ref()?.iter().map(|&(x, a)| (lo + (hi - lo) * x, a)).collect())
+    pub fn opacity_over(&self, range: [f64; 2]) -> Option<Vec<(f64, f64)>> {
+        let points: Vec<_> = self.opacity.as_ref()?.iter().map(|&(x, a)| (x, [a])).collect();
+        Some(self.spread(&points, range).into_iter().map(|(s, [a])| (s, a)).collect())
     }
 }
 
@@ -115,10 +158,66 @@ struct Preset {
     color_space: Option<String>,
     points: Option<Vec<f64>>,
     indexed_colors: Option<serde::de::IgnoredAny>,
+    #[serde(rename = "HSVWrap")]
+    hsv_wrap: Option<Flag>,
+    use_log_scale: Option<Flag>,
 }
 
-/// A list (s, N numbers, s, …) as points over [0, 1].
-fn tuples<const N: usize>(list: &[f64]) -> Result<Vec<(f64, [f64; N])>, String> {
+/// What a preset may say that Halite does, or that changes no picture of values that are finite.
+const KNOWN: [&str; 19] = [
+    "RGBPoints",
+    "ColorSpace",
+    "Points",
+    "IndexedColors",
+    "HSVWrap",
+    "UseLogScale",
+    "Name",
+    "Creator",
+    "Author",
+    "License",
+    "Source",
+    "Category",
+    "Groups",
+    "Tags",
+    "DefaultMap",
+    "NanColor",
+    "NanOpacity",
+    "AllowDuplicateScalars",
+    "AutomaticRescaleRangeMode",
+];
+
+/// Yes or no, as ParaView writes it.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(untagged)]
+enum Flag {
+    Bool(bool),
+    Number(f64),
+    List([f64; 1]),
+}
+
+impl Flag {
+    fn is_set(self) -> bool {
+        match self {
+            Flag::Bool(set) => set,
+            Flag::Number(n) | Flag::List([n]) => n != 0.0,
+        }
+    }
+}
+
+/// Whether a property's value is one that says nothing: no, none, or an empty list.
+fn is_unset(value: &serde_json::Value) -> bool {
+    match value {
+        serde_json::Value::Null => true,
+        serde_json::Value::Bool(set) => !set,
+        serde_json::Value::Number(n) => n.as_f64() == Some(0.0),
+        serde_json::Value::String(s) => s.is_empty(),
+        serde_json::Value::Array(list) => list.iter().all(is_unset),
+        serde_json::Value::Object(list) => list.is_empty(),
+    }
+}
+
+/// A list (s, N numbers, s, …) as points over [0, 1]; if `log`, of the logarithms, if they have such.
+fn tuples<const N: usize>(list: &[f64], log: bool) -> Result<Vec<(f64, [f64; N])>, String> {
     if list.is_empty() || !list.len().is_multiple_of(N + 1) {
         return Err(format!("holds {} numbers, not {} for each point", list.len(), N + 1));
     }
@@ -129,6 +228,9 @@ fn tuples<const N: usize>(list: &[f64]) -> Result<Vec<(f64, [f64; N])>, String> 
     let mut points: Vec<(f64, [f64; N])> = points.collect();
     if let Some(i) = points.windows(2).position(|w| w[1].0 < w[0].0) {
         return Err(format!("decreases from {} to {}", points[i].0, points[i + 1].0));
+    }
+    if log && points[0].0 > 0.0 {
+        points.iter_mut().for_each(|p| p.0 = p.0.ln());
     }
     let (lo, hi) = (points[0].0, points[points.len() - 1].0);
     for p in &mut points {
@@ -308,6 +410,36 @@ mod tests {
         }
         let named = ColorMap::named("cool to warm").unwrap();
         close(color(&named, 0.25), [0.553318, 0.688635, 0.995188], 1.0 / 255.0);
+    }
+
+    /// What vtkColorTransferFunction 9.7 answers with HSVWrap off, as ParaView has it, and on; and with log10 scale.
+    #[test]
+    fn hue_wraps_and_values_are_logarithms_where_a_preset_says_so() {
+        let rainbow = "0, 0, 0, 1, 1, 1, 0, 0";
+        for (wrap, x, wanted) in [
+            ("", 0.25, [0.0, 1.0, 1.0]),
+            ("", 0.5, [0.0, 1.0, 0.0]),
+            (r#""HSVWrap": 0,"#, 0.75, [1.0, 1.0, 0.0]),
+            (r#""HSVWrap": 1,"#, 0.5, [1.0, 0.0, 1.0]),
+            (r#""HSVWrap": true,"#, 0.25, [0.5, 0.0, 1.0]),
+        ] {
+            let map = preset(&format!(r#"[{{"Name": "x", {wrap} "ColorSpace": "HSV", "RGBPoints": [{rainbow}]}}]"#));
+            close(color(&map.unwrap(), x), wanted, 1.1e-4);
+        }
+        let points = "1, 1, 0, 0.2, 10, 0.2, 0.3, 1, 1000, 1, 1, 0.1";
+        let map = preset(&format!(r#"[{{"Name": "x", "UseLogScale": 1, "RGBPoints": [{points}]}}]"#)).unwrap();
+        let at = |range, s| TransferFunction::new(map.over(range), vec![(0.0, 1.0)], 1.0).unwrap().color_at(s);
+        for (s, wanted) in [
+            (2.0, [0.759176, 0.090309, 0.440824]),
+            (5.0, [0.440824, 0.209691, 0.759176]),
+            (100.0, [0.6, 0.65, 0.55]),
+            (500.0, [0.879588, 0.89464, 0.235463]),
+        ] {
+            close(at([1.0, 1e3], s), wanted, 1.1e-4);
+            close(at([1e-6, 1e-3], s * 1e-6), wanted, 1.1e-4);
+        }
+        // There are no logarithms: as if it said nothing.
+        close(at([0.0, 3.0], 1.0), [0.2, 0.3, 1.0], 1e-12);
     }
 
     /// What vtkPiecewiseFunction 9.7 answers.
