@@ -16,7 +16,7 @@ pub(crate) struct Variant {
     /// How long a ray's way through an interpolated cell is: distance, or depth
     #[arg(long, value_name = "KIND", value_parser = named::<Thickness>, help_heading = "Projection engine")]
     thickness: Option<Thickness>,
-    /// In which sequence cells are drawn: depth, circumsphere (exact for Delaunay meshes), or none
+    /// In which sequence cells are drawn: depth, circumsphere (for Delaunay meshes, as exact as f64), or none
     #[arg(long, value_name = "KIND", value_parser = named::<Order>, help_heading = "Projection engine")]
     order: Option<Order>,
     /// What cells are blended into: rgba32float, rgba16float or rgba8
