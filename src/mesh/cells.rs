@@ -215,20 +215,29 @@ impl Tetrahedra {
         Cow::Owned(of_mesh.par_iter().copied().chain(added).collect())
     }
 
-    /// The same for values, `components` of them for each point.
+    /// The values at the points that the split added, `components` for each, from `value` of those of the mesh.
+    pub fn added_values(&self, components: usize, value: impl Fn(usize) -> f64 + Sync) -> Vec<f64> {
+        let at = |i: usize| {
+            let (point, k) = (i / components, i % components);
+            let share = |(source, weight): (u32, f64)| weight * value(source as usize * components + k);
+            self.added.of(point).map(share).sum()
+        };
+        (0..self.added.len() * components).into_par_iter().map(at).collect()
+    }
+
+    /// All values at [`Self::points`], `components` for each: those of the mesh, and after them those that the split
+    /// added.
     ///
     /// # Panics
     /// If there are fewer values than the mesh that was split has points, times `components`.
-    pub fn values<'a>(&self, of_mesh: &'a [f32], components: usize) -> Cow<'a, [f32]> {
+    pub fn values<'a>(&self, of_mesh: Cow<'a, [f64]>, components: usize) -> Cow<'a, [f64]> {
         if self.added.is_empty() {
-            return Cow::Borrowed(of_mesh);
+            return of_mesh;
         }
-        let value = |i: usize, k: usize| {
-            let at = |(source, weight): (u32, f64)| weight * f64::from(of_mesh[source as usize * components + k]);
-            self.added.of(i).map(at).sum::<f64>() as f32
-        };
-        let added = (0..self.added.len() * components).into_par_iter().map(|i| value(i / components, i % components));
-        Cow::Owned(of_mesh.par_iter().copied().chain(added).collect())
+        let added = self.added_values(components, |i| of_mesh[i]);
+        let mut all = of_mesh.into_owned();
+        all.extend(added);
+        Cow::Owned(all)
     }
 }
 

@@ -190,7 +190,7 @@ impl Sample {
         let (mut values, mut volume) = (Vec::new(), 0.0);
         let points = tetrahedra.points(mesh.points());
         let (at_points, components) = (field.association() == Association::Point, field.kind().components());
-        let scalars = if at_points { tetrahedra.values(field.values(), components) } else { field.values().into() };
+        let scalars = if at_points { tetrahedra.values(field.values(), components) } else { field.values() };
         for t in (0..tetrahedra.corners.len()).step_by(step) {
             let corners = tetrahedra.corners[t];
             let [a, b, c, d] = corners.map(|p| points[p as usize]);
@@ -201,8 +201,7 @@ impl Sample {
                 // One corner, not their mean: that would lose the extremes.
                 Association::Point => corners[t / step % 4] as usize,
             };
-            let normal = field.normal(0);
-            let s = f64::from(scalars[at * components]) * normal.half + normal.mid;
+            let s = scalars[at * components];
             if s.is_finite() {
                 values.push((s, v));
             }
