@@ -307,7 +307,7 @@ impl Renderer {
     fn connect(&mut self, points: &[DVec3]) -> Result<()> {
         let field = self.field.take();
         if let Some(Loaded { tetrahedra, cells, .. }) = self.mesh.take() {
-            self.load(points, cells, tetrahedra);
+            self.load(points, cells, tetrahedra, &|_| {});
         }
         if let (Some(mut field), Some(mesh)) = (field, &self.mesh) {
             self.pool.install(|| field.bring_to(mesh))?;

@@ -456,7 +456,8 @@ mod tests {
         let map = preset(
             r#"{"RGBPoints": [0,0,0,0, 1,1,1,1], "Points": [0,0.1,0.3,0.4, 1,0.9,0.5,0, 2,0,0.5,1, 3,0.5,0.5,0]}"#,
         );
-        let knots = map.unwrap().opacity_over([0.0, 3.0]).unwrap();
+        let map = map.unwrap();
+        let knots = map.axis([0.0, 3.0]).knots(map.opacity().unwrap(), TOLERANCE);
         let f = TransferFunction::new(vec![(0.0, [1.0; 3])], knots, 1.0).unwrap();
         for (s, wanted) in
             [(0.1, 0.100992), (0.3, 0.5), (0.5, 0.847593), (0.9, 0.9), (1.3, 0.63), (2.2, 0.0), (2.7, 0.5)]

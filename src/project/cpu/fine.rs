@@ -277,7 +277,7 @@ impl<const N: usize> Canvas<N> {
                 self.batch.add(integral.exact, front, back, length, &mut light);
                 self.batch.flush(integral.exact.direct, &mut light);
             }
-            Some(table) => table.add(front[N - 1], back[N - 1], length, &mut light),
+            Some(table) => table.add(integral.exact, front[N - 1], back[N - 1], length, &mut light),
         }
         ([r[at], g[at], b[at]], t[at]) = (light.color, light.through);
     }
