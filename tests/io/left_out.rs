@@ -70,6 +70,7 @@ fn roles_of_arrays() {
 }
 
 /// The case of that name; none where the cases are not at hand.
+#[allow(clippy::print_stderr, reason = "a test says what it skips")]
 fn case(name: &str) -> Option<halite::Result<Mesh>> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/cases").join(name);
     if !path.exists() {
@@ -84,7 +85,6 @@ fn drawn(mesh: &Mesh) -> String {
 }
 
 #[test]
-#[allow(clippy::print_stderr, reason = "a test says what it skips")]
 fn cases_of_users() {
     if let Some(mesh) = case("k4_cell_point_cell.vtk").map(Result::unwrap) {
         let [a, b] = mesh.cell_arrays() else { panic!("{:?}", mesh.cell_arrays()) };

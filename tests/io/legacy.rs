@@ -162,9 +162,9 @@ fn damaged_data_of_legacy_files() {
     told("CELL_DATA 2", "EDGE_DATA 2", &["v x", "T"], "id", "before POINT_DATA or CELL_DATA");
     told("1 2 3 4 5\n", "1 2 3 4 5\n1e\n", &["id", "v x", "T"], "", "");
     told("1 2 3 4 5\n", "1 2 3 4 5\nNOTES 3\nof somebody\n", &["id", "v x", "T"], "", "");
-    let two = "FIELD FieldData 3\nT2 1 5 float\n1 2 3 4\n7 1 5 int\n1 2 3 4 5 6\nT 1 5 float";
-    told("FIELD FieldData 1\nT 1 5 float", two, &["id", "v x", "T"], "T2", "it holds 4 numbers");
-    told("FIELD FieldData 1\nT 1 5 float", two, &["id", "v x", "T"], "7", "more numbers");
+    let two = "FIELD FieldData 3\nT2 1 5 float\n1 2 3 4\nP7 1 5 int\n1 2 3 4 5 6\nT 1 5 float";
+    told("FIELD FieldData 1\nT 1 5 float", two, &["id", "v x", "T"], "T2", "\"P7\" is not a number");
+    told("FIELD FieldData 1\nT 1 5 float", two, &["id", "v x", "T"], "P7", "more numbers");
     told("FIELD FieldData 1", "FIELD FieldData 7", &["id", "v x", "T"], "", "");
 }
 
