@@ -85,10 +85,10 @@ fn check(what: &str, mesh: &Mesh, outer: &[Vec<DVec3>], volume: Option<f64>) -> 
     }
     assert!((sum - inside).abs() <= 1e-9 * sum, "{what}: {sum}, not {inside}");
     // What is linear stays so, and nothing goes beyond the bounds.
-    let linear = |p: &DVec3| (p.dot(dvec3(0.3, -0.7, 0.2)) + 0.1) as f32;
-    let values: Vec<f32> = mesh.points().iter().map(linear).collect();
-    for (value, p) in t.values(&values, 1).iter().zip(&cut.points) {
-        assert!((value - linear(p)).abs() < 1e-4 * p.length().max(1.0) as f32, "{what}");
+    let linear = |p: &DVec3| p.dot(dvec3(0.3, -0.7, 0.2)) + 0.1;
+    let values: Vec<f64> = mesh.points().iter().map(linear).collect();
+    for (value, p) in t.values(values.into(), 1).iter().zip(&cut.points) {
+        assert!((value - linear(p)).abs() < 1e-4 * p.length().max(1.0), "{what}");
     }
     assert!(t.added.weights.iter().all(|w| *w > -1e-9), "{what}: weights below 0");
     cut
