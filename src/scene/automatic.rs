@@ -303,7 +303,7 @@ fn transfer(
         opacity.iter_mut().for_each(|k| k.1 = rounded(k.1 * scale * unit_scale));
     }
     tracing::info!("drawing \"{name}\" from {} to {}, unit distance {unit}", range[0], range[1]);
-    Ok(TransferFunction::new(map.over(range), opacity, unit)?)
+    TransferFunction::new(map.over(range), opacity, unit)
 }
 
 /// To three digits.
