@@ -30,6 +30,14 @@ pub enum Error {
         /// The feature, by name, and what would help.
         what: String,
     },
+    /// A file has no such time step.
+    #[error("{}: {what}", path.display())]
+    Step {
+        /// The file.
+        path: PathBuf,
+        /// What was asked for, and what there is.
+        what: String,
+    },
     /// A mesh breaks a rule that every mesh must keep.
     #[error("the mesh is not valid: {0}")]
     Mesh(String),

@@ -84,6 +84,10 @@ impl Field {
             .filter(|(a, _)| wanted(a))
             .find_map(|(a, arrays)| arrays.iter().find(|x| x.name == name).map(|x| (*a, x)));
         let Some((association, array)) = found else {
+            let known = [(Association::Point, mesh.point_attributes()), (Association::Cell, mesh.cell_attributes())];
+            if let Some(why) = known.iter().filter(|(a, _)| wanted(a)).find_map(|(_, known)| known.why_left_out(name)) {
+                return Err(Error::Field(format!("array \"{name}\" was left out when the file was read: {why}")));
+            }
             let there = sources
                 .iter()
                 .filter(|(a, _)| wanted(a))

@@ -72,8 +72,27 @@ impl Image {
     /// [`Error::File`], [`Error::Unsupported`] for any other ending, or [`Error::View`] if the backdrop has another
     /// size.
     pub fn save(&self, path: &Path, backdrop: Backdrop) -> Result<()> {
+        let bytes = self.encoded(path, &ending(path), backdrop)?;
+        std::fs::write(path, bytes).map_err(|e| {
+            // Half a file is worse than none; but a device or pipe is not ours to remove.
+            if path.is_file() {
+                let _ = std::fs::remove_file(path);
+            }
+            Error::file(path, e)
+        })
+    }
+
+    /// The bytes of such a file; `format` is its ending, such as `png`.
+    ///
+    /// # Errors
+    /// As [`Image::save`].
+    pub fn encode(&self, format: &str, backdrop: Backdrop) -> Result<Vec<u8>> {
+        self.encoded(Path::new("the picture"), format, backdrop)
+    }
+
+    fn encoded(&self, path: &Path, format: &str, backdrop: Backdrop) -> Result<Vec<u8>> {
         let [w, h] = self.size.map(|n| n as usize);
-        let bytes = match ending(path).as_str() {
+        Ok(match format {
             "npy" => npy::encode(&[h, w, 4], self.pixels.as_flattened()),
             "exr" => self.exr().map_err(|e| Error::file(path, std::io::Error::other(e)))?,
             "png" => {
@@ -85,13 +104,6 @@ impl Image {
                 bytes
             }
             _ => return Err(Error::unsupported(path, "the picture can be written as .png, .exr or .npy")),
-        };
-        std::fs::write(path, bytes).map_err(|e| {
-            // Half a file is worse than none; but a device or pipe is not ours to remove.
-            if path.is_file() {
-                let _ = std::fs::remove_file(path);
-            }
-            Error::file(path, e)
         })
     }
 

@@ -1,8 +1,11 @@
 //! The mesh: points, cells and data arrays of an unstructured grid, validated once.
 
+mod attributes;
 pub mod cells;
 pub mod faces;
 pub mod generate;
+
+pub use attributes::{Attributes, LeftOut, Role};
 
 use crate::error::{Error, Result};
 use glam::DVec3;
@@ -147,6 +150,19 @@ pub struct Mesh {
     polyhedra: Option<Polyhedra>,
     point_arrays: Vec<Array>,
     cell_arrays: Vec<Array>,
+    point_attributes: Attributes,
+    cell_attributes: Attributes,
+}
+
+/// What a mesh is made of.
+pub(crate) struct MeshParts {
+    pub(crate) points: Vec<DVec3>,
+    pub(crate) cells: Cells,
+    pub(crate) polyhedra: Option<Polyhedra>,
+    /// Arrays of points, and of cells.
+    pub(crate) arrays: [Vec<Array>; 2],
+    /// What is known of either.
+    pub(crate) attributes: [Attributes; 2],
 }
 
 impl Mesh {
@@ -182,7 +198,24 @@ impl Mesh {
         }
         point_arrays.iter().try_for_each(|a| check_array("point", a, points.len()))?;
         cell_arrays.iter().try_for_each(|a| check_array("cell", a, n))?;
-        Ok(Mesh { points, cells, polyhedra: None, point_arrays, cell_arrays })
+        let [point_attributes, cell_attributes] = Default::default();
+        Ok(Mesh { points, cells, polyhedra: None, point_arrays, cell_arrays, point_attributes, cell_attributes })
+    }
+
+    /// Takes it apart.
+    pub(crate) fn into_parts(self) -> MeshParts {
+        MeshParts {
+            points: self.points,
+            cells: self.cells,
+            polyhedra: self.polyhedra,
+            arrays: [self.point_arrays, self.cell_arrays],
+            attributes: [self.point_attributes, self.cell_attributes],
+        }
+    }
+
+    /// Sets what is known of its arrays beside their values: of points, and of cells.
+    pub fn set_attributes(&mut self, of_points: Attributes, of_cells: Attributes) {
+        (self.point_attributes, self.cell_attributes) = (of_points, of_cells);
     }
 
     /// The same mesh, with the faces of its polyhedra; without, they are not drawn.
@@ -261,6 +294,16 @@ impl Mesh {
     /// The arrays with a value for each cell.
     pub fn cell_arrays(&self) -> &[Array] {
         &self.cell_arrays
+    }
+
+    /// What is known of the arrays of points beside their values.
+    pub fn point_attributes(&self) -> &Attributes {
+        &self.point_attributes
+    }
+
+    /// What is known of the arrays of cells beside their values.
+    pub fn cell_attributes(&self) -> &Attributes {
+        &self.cell_attributes
     }
 }
 

@@ -109,14 +109,22 @@ impl Scene {
     /// [`Error::File`]; [`Error::Malformed`], which names the key; [`Error::Unsupported`] for bivariate widgets.
     pub fn open(path: &Path) -> Result<Self> {
         let text = std::fs::read(path).map_err(|e| Error::file(path, e))?;
-        let mut json = serde_json::Deserializer::from_slice(&text);
+        Self::parse(path, &text)
+    }
+
+    /// Reads a scene from its text. `path` is what messages call it; what it names is looked for in the folder of that.
+    ///
+    /// # Errors
+    /// As [`Scene::open`].
+    pub fn parse(path: &Path, text: &[u8]) -> Result<Self> {
+        let mut json = serde_json::Deserializer::from_slice(text);
         let file: file::File = serde_path_to_error::deserialize(&mut json).map_err(|e| {
             let key = e.path().to_string();
             let what = e.into_inner().to_string();
             Error::malformed(path, if key == "." { what } else { format!("{key}: {what}") })
         })?;
         json.end().map_err(|e| Error::malformed(path, format!("after the scene: {e}")))?;
-        let value: Value = serde_json::from_slice(&text).map_err(|e| Error::malformed(path, e.to_string()))?;
+        let value: Value = serde_json::from_slice(text).map_err(|e| Error::malformed(path, e.to_string()))?;
         file::check(&value).map_err(|what| Error::malformed(path, what))?;
         file.scene(path)
     }

@@ -143,7 +143,7 @@ fn failures_are_one_line() {
     place.fails("render . --out x.png", &["halite: .: "]);
     for (name, text, part) in [
         ("a.vti", "<VTKFile type='ImageData'/>", "a structured grid"),
-        ("a.pvd", "<VTKFile type='Collection'/>", "a list of files"),
+        ("a.pvd", "<VTKFile type='Collection'/>", "it lists no file"),
         ("a.vtm", "<VTKFile type='vtkMultiBlockDataSet'/>", "Merge Blocks"),
         ("a.vtkhdf", "\u{7f}HDF", "a VTKHDF file"),
         ("a.ex2", "CDF", "ParaView"),

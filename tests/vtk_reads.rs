@@ -9,6 +9,9 @@
     reason = "a test fails by panicking"
 )]
 
+#[path = "vtk/random.rs"]
+mod random;
+
 use glam::DVec3;
 use halite::mesh::{Array, Mesh, POLYHEDRON, Values};
 use std::path::{Path, PathBuf};

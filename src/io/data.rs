@@ -6,20 +6,20 @@
 //! small.
 
 use super::Progress;
-use super::number::{Kind, Number, with_kind};
+use super::input::{Input, Opened, copy_at};
+use super::number::Kind;
+use super::text;
 use super::unpack::{Codec, Unpacker};
 use crate::error::{Error, Result};
 use base64::Engine;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use rayon::prelude::*;
 use std::fmt::{Display, Formatter};
-use std::fs::File;
 use std::ops::Range;
-use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// Bytes of a chunk of an array that is not packed: small enough for the cache, large enough for a system call.
-const CHUNK: usize = 1 << 18;
+pub(super) const CHUNK: usize = 1 << 18;
 
 /// Writers differ in how they end a base64 text.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
@@ -30,7 +30,7 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
 );
 
 /// A data array as the head of the file describes it.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct DataArray {
     /// The element that it is in: `PointData`, `Cells` and so on.
     pub(super) section: &'static str,
@@ -41,6 +41,8 @@ pub(super) struct DataArray {
     /// Whether each number is a bit, of bytes.
     pub(super) bits: bool,
     pub(super) components: usize,
+    /// The time steps that it is for; all of them if it says none.
+    pub(super) steps: Vec<usize>,
     pub(super) data: Data,
 }
 
@@ -52,7 +54,7 @@ impl Display for DataArray {
 }
 
 /// Where the numbers of a data array are.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) enum Data {
     /// Between the element's tags, as text; comments may part it.
     Ascii(Vec<Range<u64>>),
@@ -69,7 +71,7 @@ pub(super) type Put<'p> = dyn Fn(usize, &[u8], &mut [u8]) -> Result<(), String> 
 /// The file that the arrays are in, and what its root element says of them all.
 #[derive(Debug)]
 pub(super) struct Store {
-    pub(super) path: PathBuf,
+    pub(super) input: Input,
     /// Length of the file in bytes.
     pub(super) length: u64,
     pub(super) big_endian: bool,
@@ -116,24 +118,24 @@ impl Store {
     /// Opens an array, to be counted or read.
     pub(super) fn array<'a>(&'a self, array: &'a DataArray) -> Result<Contents<'a>> {
         let named = |fault| self.named(array, fault);
-        let file = File::open(&self.path).map_err(|e| named(Fault::Io(e)))?;
+        let file = self.input.open().map_err(|e| named(Fault::Io(e)))?;
         let body = self.body(array, file).map_err(named)?;
         Ok(Contents { store: self, array, body })
     }
 
     fn named(&self, array: &DataArray, fault: Fault) -> Error {
         match fault {
-            Fault::Io(source) => Error::file(&self.path, source),
-            Fault::Malformed(what) => Error::malformed(&self.path, format!("{array}: {what}")),
-            Fault::Unsupported(what) => Error::unsupported(&self.path, format!("{array}: {what}")),
+            Fault::Io(source) => Error::file(&self.input.path, source),
+            Fault::Malformed(what) => Error::malformed(&self.input.path, format!("{array}: {what}")),
+            Fault::Unsupported(what) => Error::unsupported(&self.input.path, format!("{array}: {what}")),
         }
     }
 
-    fn body(&self, array: &DataArray, file: File) -> Result<Body, Fault> {
+    fn body(&self, array: &DataArray, file: Opened) -> Result<Body, Fault> {
         let bytes = match &array.data {
-            Data::Ascii(ranges) => return Ok(Body::Text(text(&file, ranges)?)),
+            Data::Ascii(ranges) => return Ok(Body::Text(text::read(&file, ranges)?)),
             Data::Base64(ranges) => {
-                let mut text = text(&file, ranges)?;
+                let mut text = text::read(&file, ranges)?;
                 text.retain(|c| !c.is_ascii_whitespace());
                 let end = text.len() as u64;
                 Bytes { source: Source::Memory(text), base64: true, start: 0, end, skip: 0 }
@@ -239,19 +241,15 @@ struct Bytes {
 
 #[derive(Debug)]
 enum Source {
-    File(File),
+    File(Opened),
     Memory(Vec<u8>),
 }
 
 impl Source {
     fn read(&self, at: u64, out: &mut [u8]) -> std::io::Result<()> {
         match self {
-            Source::File(file) => read_at(file, at, out),
-            Source::Memory(bytes) => {
-                let from = usize::try_from(at).ok().and_then(|at| bytes.get(at..)?.get(..out.len()));
-                out.copy_from_slice(from.ok_or(std::io::ErrorKind::UnexpectedEof)?);
-                Ok(())
-            }
+            Source::File(file) => file.read_at(at, out),
+            Source::Memory(bytes) => copy_at(bytes, at, out),
         }
     }
 }
@@ -332,7 +330,7 @@ impl Contents<'_> {
     /// How many numbers the array says it has.
     pub(super) fn count(&self) -> u64 {
         match &self.body {
-            Body::Text(text) => parts(text).par_iter().map(|part| tokens(part).count() as u64).sum(),
+            Body::Text(text) => text::count(text),
             Body::Blocks(blocks) => blocks.total / self.array.kind.size() as u64,
         }
     }
@@ -349,7 +347,7 @@ impl Contents<'_> {
             };
             match &self.body {
                 _ if count == 0 => Ok(()),
-                Body::Text(text) => parse(self.array.kind, text, bytes, size, &put),
+                Body::Text(text) => Ok(text::parse(self.array.kind, text, bytes, size, &put)?),
                 Body::Blocks(blocks) => blocks.fill(
                     self.array.kind,
                     self.store.big_endian != cfg!(target_endian = "big"),
@@ -375,7 +373,7 @@ impl Contents<'_> {
         let stated = blocks.total;
         let spare = blocks.packed.is_none() && stated > total && self.array.section.ends_with("Data");
         if spare && count > 0 {
-            let path = self.store.path.display();
+            let path = self.store.input.path.display();
             tracing::warn!("{path}: {} has {stated} bytes; only {total} of them are needed and read", self.array);
         } else if !spare && stated != total {
             return Err(format!("it holds {stated} bytes, but its numbers need {total}").into());
@@ -456,78 +454,4 @@ pub(super) fn reverse(bytes: &mut [u8], size: usize) {
     if size > 1 {
         bytes.chunks_exact_mut(size).for_each(<[u8]>::reverse);
     }
-}
-
-/// The text of an array between its tags, parts separated by a space.
-fn text(file: &File, ranges: &[Range<u64>]) -> std::io::Result<Vec<u8>> {
-    let mut text = Vec::new();
-    for range in ranges {
-        let (at, start) = (text.len(), range.start);
-        text.resize(at + (range.end - start) as usize, 0);
-        text[at..]
-            .par_chunks_mut(CHUNK)
-            .enumerate()
-            .try_for_each(|(i, chunk)| read_at(file, start + (i * CHUNK) as u64, chunk))?;
-        text.push(b' ');
-    }
-    Ok(text)
-}
-
-/// Cuts a text into chunks, between numbers.
-fn parts(mut text: &[u8]) -> Vec<&[u8]> {
-    let mut parts = Vec::new();
-    while !text.is_empty() {
-        let end = text.iter().skip(CHUNK).position(u8::is_ascii_whitespace).map_or(text.len(), |i| CHUNK + i);
-        let (part, rest) = text.split_at(end);
-        parts.push(part);
-        text = rest;
-    }
-    parts
-}
-
-/// Parses the numbers of an ascii array, as many as `out` has place for.
-fn parse(kind: Kind, text: &[u8], out: &mut [u8], size: usize, put: &Put<'_>) -> Result<(), Fault> {
-    let parts = parts(text);
-    let counts: Vec<usize> = parts.par_iter().map(|part| tokens(part).count()).collect();
-    let (mut rest, mut first) = (out, 0);
-    let mut jobs = Vec::new();
-    for (part, count) in parts.iter().zip(counts) {
-        let (place, after) = rest.split_at_mut(count * size);
-        jobs.push((first, *part, place));
-        (rest, first) = (after, first + count);
-    }
-    jobs.into_par_iter().try_for_each(
-        |(first, part, place)| with_kind!(kind, T => put(first, bytemuck::cast_slice(&numbers::<T>(part)?), place)),
-    )?;
-    Ok(())
-}
-
-fn numbers<T: Number>(text: &[u8]) -> Result<Vec<T>, String> {
-    let number = |token: &[u8]| {
-        std::str::from_utf8(token).ok().and_then(T::parse).ok_or_else(|| {
-            let token = String::from_utf8_lossy(&token[..token.len().min(40)]);
-            format!("\"{}\" is not a number of its type", token.escape_debug())
-        })
-    };
-    tokens(text).map(number).collect()
-}
-
-fn tokens(text: &[u8]) -> impl Iterator<Item = &[u8]> {
-    text.split(u8::is_ascii_whitespace).filter(|token| !token.is_empty())
-}
-
-#[cfg(unix)]
-fn read_at(file: &File, at: u64, out: &mut [u8]) -> std::io::Result<()> {
-    std::os::unix::fs::FileExt::read_exact_at(file, out, at)
-}
-
-#[cfg(windows)]
-fn read_at(file: &File, mut at: u64, mut out: &mut [u8]) -> std::io::Result<()> {
-    while !out.is_empty() {
-        match std::os::windows::fs::FileExt::seek_read(file, out, at)? {
-            0 => return Err(std::io::ErrorKind::UnexpectedEof.into()),
-            n => (at, out) = (at + n as u64, &mut out[n..]),
-        }
-    }
-    Ok(())
 }

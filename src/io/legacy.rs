@@ -1,26 +1,27 @@
 //! Legacy .vtk files, versions 1 to 5.1, ascii or binary (VTK File Formats, "Simple Legacy Formats").
 //!
-//! vtkio parses them (`parsed`). What it cannot, or would lose, is scanned here: a file is a list of sections, each a
-//! keyword, a line that says what follows, and arrays. Nothing is skipped that has no name: what is not known is an
-//! error, as nobody could tell where it ends.
+//! A file is a list of sections, each a keyword, a line that says what follows, and numbers. Points and cells must be
+//! whole. Of what describes them (`data`), anything that is not is left out by name, and reading goes on where the next
+//! section starts. Files whose points or cells are written as the scanner (`scan`) does not know are tried with vtkio
+//! (`parsed`).
 
+mod data;
 mod parsed;
 mod scan;
 
+use super::input::Input;
 use super::vtu::renumber;
-use super::{refuse, validated};
+use super::{MOST_WARNINGS, refuse, validated, warn_of_left_out};
 use crate::error::{Error, Result};
-use crate::mesh::{Array, Cells, Mesh, POLYHEDRON, Polyhedra, Values};
+use crate::mesh::{Array, Attributes, Cells, Mesh, POLYHEDRON, Polyhedra, Values};
 use glam::DVec3;
 use scan::{Fault, Scanner, Type};
-use std::fs::File;
-use std::io::{Read, Seek};
 use std::path::Path;
 
 /// Reads the unstructured grid in a legacy file.
-pub(super) fn read(path: &Path, file: &mut File) -> Result<Mesh> {
-    let mut bytes = Vec::new();
-    file.rewind().and_then(|()| file.read_to_end(&mut bytes)).map_err(|e| Error::file(path, e))?;
+pub(super) fn read(input: &Input) -> Result<Mesh> {
+    let path = &input.path;
+    let bytes = input.bytes().map_err(|e| Error::file(path, e))?;
     let mut scanner = Scanner::new(&bytes);
     // "# vtk DataFile Version 4.2", a title, and how it is written.
     let version = scanner.line();
@@ -44,16 +45,9 @@ pub(super) fn read(path: &Path, file: &mut File) -> Result<Mesh> {
         Some(other) => return Err(refuse(path, other)),
         None => return Err(Error::malformed(path, "there is no data set in it")),
     }
-    if let Some(parts) = Parts::parsed(&bytes) {
-        return parts.mesh(path, version);
-    }
     let mut parts = Parts::default();
-    while !scanner.is_at_end() {
-        let at = scanner.at();
-        let mut section = "a section".to_owned();
-        parts
-            .section(&mut scanner, &mut section)
-            .map_err(|what| Error::malformed(path, format!("{section}, at byte {at}: {what}")))?;
+    if let Err(what) = parts.scan(&mut scanner) {
+        parts = Parts::parsed(&bytes).ok_or_else(|| Error::malformed(path, what))?;
     }
     parts.mesh(path, version)
 }
@@ -61,59 +55,83 @@ pub(super) fn read(path: &Path, file: &mut File) -> Result<Mesh> {
 /// What was read so far.
 #[derive(Default)]
 struct Parts {
-    points: Vec<DVec3>,
-    offsets: Vec<u64>,
+    points: Option<Vec<DVec3>>,
+    offsets: Option<Vec<u64>>,
     connectivity: Vec<u32>,
-    types: Vec<u8>,
+    types: Option<Vec<u8>>,
     /// Of points and of cells.
     arrays: [Vec<Array>; 2],
+    attributes: [Attributes; 2],
     /// Which of these come now, and how many tuples they have.
     current: Option<(usize, usize)>,
+    /// Which of these the file has, and how many tuples it says.
+    counts: Vec<(usize, usize)>,
+    /// What else was passed over.
+    notes: Vec<String>,
 }
 
+/// What the sections are called that have data of points (0) and of cells (1).
+const SECTIONS: [&str; 2] = ["POINT_DATA", "CELL_DATA"];
+
 impl Parts {
-    /// Reads one section, and tells its name.
-    fn section(&mut self, from: &mut Scanner<'_>, section: &mut String) -> Result<(), Fault> {
-        let keyword = from.word("a keyword")?.to_ascii_uppercase();
-        *section = if keyword.chars().all(|c| c.is_ascii_graphic()) && keyword.len() < 40 {
-            keyword.clone()
-        } else {
-            "a section".into()
-        };
-        match keyword.as_str() {
+    /// Reads all sections. The error is one of points or cells.
+    fn scan(&mut self, from: &mut Scanner<'_>) -> Result<(), Fault> {
+        while !from.is_at_end() {
+            let at = from.at();
+            let keyword = from.word("a keyword")?.to_ascii_uppercase();
+            let named = |what: Fault| format!("{keyword}, at byte {at}: {what}");
+            match keyword.as_str() {
+                "POINTS" | "CELLS" | "CELL_TYPES" => {
+                    self.geometry(from, &keyword).map_err(named)?;
+                    if !from.binary && from.is_at_number() {
+                        return Err(named("it holds more numbers than it says".to_owned()));
+                    }
+                }
+                "POINT_DATA" | "CELL_DATA" => {
+                    let of = usize::from(keyword == SECTIONS[1]);
+                    let count = from.count("its number of tuples").map_err(named)?;
+                    self.current = Some((of, count));
+                    self.counts.push((of, count));
+                    // What follows cannot be understood.
+                    if self.wrong_count().is_some() {
+                        return Ok(());
+                    }
+                }
+                _ => self.data(from, &keyword, at),
+            }
+            from.pass_metadata();
+        }
+        Ok(())
+    }
+
+    fn geometry(&mut self, from: &mut Scanner<'_>, keyword: &str) -> Result<(), Fault> {
+        match keyword {
             "POINTS" => {
                 let count = from.count("the number of points")?;
                 let kind = Type::from_name(&from.word("their type")?, from.binary)?;
                 let values = from.values(kind, count.checked_mul(3))?.ok_or("they are strings")?;
                 let coordinate = |i| values.get(i);
-                self.points = (0..count).map(|p| DVec3::from_array([0, 1, 2].map(|i| coordinate(3 * p + i)))).collect();
+                let point = |p: usize| DVec3::from_array([0, 1, 2].map(|i| coordinate(3 * p + i)));
+                self.points = Some((0..count).map(point).collect());
             }
             "CELLS" => self.cells(from)?,
-            "CELL_TYPES" => {
+            _ => {
                 let count = from.count("the number of cells")?;
                 from.enter_numbers();
                 let types = from.numbers::<i32>(count)?.into_iter().enumerate();
                 let narrow = |(c, kind)| u8::try_from(kind).map_err(|_| format!("the type of cell {c} is {kind}"));
-                self.types = types.map(narrow).collect::<Result<_, _>>()?;
+                self.types = Some(types.map(narrow).collect::<Result<_, _>>()?);
             }
-            "POINT_DATA" => self.current = Some((0, from.count("the number of points")?)),
-            "CELL_DATA" => self.current = Some((1, from.count("the number of cells")?)),
-            "FIELD" => {
-                let name = from.word("its name")?;
-                for _ in 0..from.count(&format!("the number of arrays of {name}"))? {
-                    self.field(from, section)?;
-                }
-            }
-            _ => self.attribute(from, &keyword, section)?,
         }
-        from.pass_metadata();
         Ok(())
     }
 
     /// Cells: the number of points of each, and these; from version 5 on where each ends, and all points.
     fn cells(&mut self, from: &mut Scanner<'_>) -> Result<(), Fault> {
         let (count, size) = (from.count("the number of cells")?, from.count("the size of the list")?);
+        self.connectivity.clear();
         if count == 0 {
+            self.offsets = Some(vec![0]);
             return Ok(());
         }
         if !from.pass("OFFSETS") {
@@ -121,8 +139,7 @@ impl Parts {
             let list = from.numbers::<i32>(size)?;
             // What is negative is out of range in any case.
             let list: Vec<u32> = list.into_iter().map(|n| u32::try_from(n).unwrap_or(u32::MAX)).collect();
-            self.unpack(&list)?;
-            return Ok(());
+            return self.unpack(&list, count);
         }
         let list = |from: &mut Scanner<'_>, count| -> Result<Values, Fault> {
             let kind = Type::from_name(&from.word("the type of the list")?, from.binary)?;
@@ -135,104 +152,58 @@ impl Parts {
         let points = list(from, size)?;
         // Exact to 2^53; what is negative is out of range, as is what is larger.
         let index = |x: f64| if x < 0.0 { u64::MAX } else { x as u64 };
-        self.offsets = (0..offsets.len()).map(|i| index(offsets.get(i))).collect();
+        self.offsets = Some((0..offsets.len()).map(|i| index(offsets.get(i))).collect());
         let point = |i| u32::try_from(index(points.get(i))).unwrap_or(u32::MAX);
         self.connectivity = (0..points.len()).map(point).collect();
         Ok(())
     }
 
     /// Takes apart a list of cells: the number of points of each, and these.
-    fn unpack(&mut self, list: &[u32]) -> Result<(), Fault> {
+    fn unpack(&mut self, list: &[u32], count: usize) -> Result<(), Fault> {
         let mut rest = list;
-        self.offsets = vec![0];
+        let mut offsets = vec![0];
         while let Some((own, after)) = rest.split_first() {
-            let cell = self.offsets.len() - 1;
+            let cell = offsets.len() - 1;
             let (points, after) = after
                 .split_at_checked(*own as usize)
                 .ok_or_else(|| format!("cell {cell} has more points than it lists"))?;
             self.connectivity.extend_from_slice(points);
-            self.offsets.push(self.connectivity.len() as u64);
+            offsets.push(self.connectivity.len() as u64);
             rest = after;
         }
+        let found = offsets.len() - 1;
+        if count != found {
+            return Err(format!("it says {count} cells, and its {} numbers are {found}", list.len()));
+        }
+        self.offsets = Some(offsets);
         Ok(())
     }
 
-    /// One array of field data: its name, components, tuples and type. What comes before any point or cell data is of
-    /// the file, and left out.
-    fn field(&mut self, from: &mut Scanner<'_>, section: &mut String) -> Result<(), Fault> {
-        let name = from.word("the name of an array")?;
-        if name == "NULL_ARRAY" {
-            return Ok(());
-        }
-        *section = format!("array \"{}\"", name.escape_debug());
-        let (components, tuples) = (from.count("its number of components")?, from.count("its number of tuples")?);
-        let kind = Type::from_name(&from.word("its type")?, from.binary)?;
-        let values = from.values(kind, components.checked_mul(tuples))?;
-        self.keep(&name, components, values);
-        from.pass_metadata();
-        Ok(())
+    /// Says which section of data has not as many tuples as there are points or cells.
+    fn wrong_count(&self) -> Option<String> {
+        let there = [self.points.as_ref().map(Vec::len), self.types.as_ref().map(Vec::len)];
+        let wrong = |(of, count): &&(usize, usize)| there[*of].is_some_and(|there| there != *count);
+        let (of, count) = self.counts.iter().find(wrong)?;
+        let (section, what) = (SECTIONS[*of], ["points", "cells"][*of]);
+        Some(format!("{section} has {count} tuples where there are {} {what}", there[*of]?))
     }
 
-    /// An array of points or cells that says by its keyword what it is for.
-    fn attribute(&mut self, from: &mut Scanner<'_>, keyword: &str, section: &mut String) -> Result<(), Fault> {
-        let fixed = match keyword {
-            "SCALARS" | "COLOR_SCALARS" | "TEXTURE_COORDINATES" | "LOOKUP_TABLE" => 0,
-            "GLOBAL_IDS" | "PEDIGREE_IDS" | "EDGE_FLAGS" => 1,
-            "VECTORS" | "NORMALS" | "TANGENTS" => 3,
-            "TENSORS6" => 6,
-            "TENSORS" => 9,
-            _ => return Err("Halite does not know such a section".to_owned()),
-        };
-        let name = from.word("its name")?;
-        *section = format!("array \"{}\"", name.escape_debug());
-        let colors = Type::from_name(if from.binary { "unsigned_char" } else { "float" }, from.binary)?;
-        if keyword == "LOOKUP_TABLE" {
-            let size = from.count("its size")?;
-            from.values(colors, size.checked_mul(4))?;
-            return Ok(());
+    fn mesh(mut self, path: &Path, version: f64) -> Result<Mesh> {
+        // Where a file has no points or cells at all, it has none.
+        self.points.get_or_insert_default();
+        self.types.get_or_insert_default();
+        let wrong = self.wrong_count();
+        let (points, types) = (self.points.unwrap_or_default(), self.types.unwrap_or_default());
+        let (offsets, mut connectivity) = (self.offsets.unwrap_or_else(|| vec![0]), self.connectivity);
+        if offsets.len() != types.len() + 1 {
+            let (types, cells) = (types.len(), offsets.len().saturating_sub(1));
+            return Err(Error::malformed(path, format!("CELL_TYPES has {types} types where there are {cells} CELLS")));
         }
-        let Some((_, tuples)) = self.current else { return Err("it comes before POINT_DATA or CELL_DATA".to_owned()) };
-        let (components, kind) = match keyword {
-            "COLOR_SCALARS" => (from.count("its number of components")?, colors),
-            "TEXTURE_COORDINATES" => {
-                let components = from.count("its number of components")?;
-                (components, Type::from_name(&from.word("its type")?, from.binary)?)
-            }
-            "SCALARS" => {
-                let kind = Type::from_name(&from.word("its type")?, from.binary)?;
-                // On the same line, or there is one; a table of colours may be named on the next.
-                (from.count_on_line().unwrap_or(1), kind)
-            }
-            _ => (fixed, Type::from_name(&from.word("its type")?, from.binary)?),
-        };
-        if keyword == "SCALARS" {
-            from.pass_table()?;
-        }
-        let mut values = from.values(kind, components.checked_mul(tuples))?;
-        if let ("COLOR_SCALARS", Some(Values::F32(shares))) = (keyword, &values) {
-            values = Some(Values::U8(shares.iter().map(|share| (share * 255.0).round() as u8).collect()));
-        }
-        self.keep(&name, components, values);
-        Ok(())
-    }
-
-    fn keep(&mut self, name: &str, components: usize, values: Option<Values>) {
-        match (values, self.current) {
-            (Some(values), Some((of, _))) if components > 0 => {
-                self.arrays[of].push(Array { name: decoded(name), components, values });
-            }
-            (None, Some(_)) => tracing::warn!("array \"{name}\" is left out: it is of strings"),
-            _ => {}
-        }
-    }
-
-    fn mesh(self, path: &Path, version: f64) -> Result<Mesh> {
-        let Parts { points, mut offsets, mut connectivity, types, arrays: [of_points, of_cells], .. } = self;
-        if offsets.is_empty() {
-            offsets.push(0);
+        if let Some(what) = wrong {
+            return Err(Error::malformed(path, what));
         }
         let fits = offsets.is_sorted() && offsets.last() == Some(&(connectivity.len() as u64));
-        if version < 5.1 && fits && offsets.len() == types.len() + 1 {
+        if version < 5.1 && fits {
             // From 5.1 on Lagrange hexahedra are numbered as now. VTK's reader takes Bézier hexahedra for such too.
             renumber(&[72, 79], &types, &offsets[1..], &mut connectivity);
         }
@@ -241,8 +212,18 @@ impl Parts {
             let what = format!("the faces of polyhedron {c} do not fit the numbers that CELLS lists for it");
             Error::malformed(path, what)
         })?;
+        let [of_points, of_cells] = self.arrays;
         let mesh = Mesh::new(points, cells, of_points, of_cells);
-        validated(path, mesh.and_then(|mesh| if let Some(p) = polyhedra { mesh.with_polyhedra(p) } else { Ok(mesh) }))
+        let mesh = mesh.and_then(|mesh| if let Some(p) = polyhedra { mesh.with_polyhedra(p) } else { Ok(mesh) });
+        let mut mesh = validated(path, mesh)?;
+        let [mut of_points, mut of_cells] = self.attributes;
+        for note in self.notes.iter().take(MOST_WARNINGS) {
+            tracing::warn!("{}: {note}", path.display());
+        }
+        warn_of_left_out(path, &mut of_points.left_out);
+        warn_of_left_out(path, &mut of_cells.left_out);
+        mesh.set_attributes(of_points, of_cells);
+        Ok(mesh)
     }
 }
 
@@ -275,24 +256,4 @@ fn unfold(cells: Cells) -> Result<(Cells, Option<Polyhedra>), usize> {
         polyhedra.cells.push(polyhedra.faces.len() as u64 - 1);
     }
     Ok((Cells { types: cells.types, offsets, connectivity }, Some(polyhedra)))
-}
-
-/// VTK writes the spaces and other odd characters of a name as `%20`.
-fn decoded(name: &str) -> String {
-    let mut bytes = Vec::with_capacity(name.len());
-    let mut rest = name.as_bytes();
-    while let Some((byte, after)) = rest.split_first() {
-        let code = after.get(..2).and_then(|hex| u8::from_str_radix(std::str::from_utf8(hex).ok()?, 16).ok());
-        match code {
-            Some(code) if *byte == b'%' => {
-                bytes.push(code);
-                rest = &after[2..];
-            }
-            _ => {
-                bytes.push(*byte);
-                rest = after;
-            }
-        }
-    }
-    String::from_utf8_lossy(&bytes).into_owned()
 }

@@ -96,6 +96,7 @@ pub fn unwelded(mesh: &Mesh) -> Mesh {
         polyhedra: None,
         point_arrays: arrays.collect(),
         cell_arrays: mesh.cell_arrays().to_vec(),
+        ..Mesh::default()
     }
 }
 
@@ -265,7 +266,14 @@ impl Builder {
         };
         let s = array("s", self.points.iter().map(|&p| field(p)).collect());
         let c = array("c", (0..cells.len()).map(at_centre).collect());
-        Mesh { points: self.points, cells, polyhedra: None, point_arrays: vec![s], cell_arrays: vec![c] }
+        Mesh {
+            points: self.points,
+            cells,
+            polyhedra: None,
+            point_arrays: vec![s],
+            cell_arrays: vec![c],
+            ..Mesh::default()
+        }
     }
 }
 

@@ -1,9 +1,15 @@
 //! What is drawn when nobody says: an array, a range, colours, opacities and a view that show something of any mesh.
 
+mod array;
+mod range;
+
+pub use array::chosen;
+pub use range::range;
+
 use super::{Scalars, Scene};
-use crate::error::{Error, Result};
-use crate::field::{Association, Component, Field};
-use crate::mesh::{Array, Mesh, Values, cells::Tetrahedra};
+use crate::error::Result;
+use crate::field::{Association, Field};
+use crate::mesh::{Mesh, cells::Tetrahedra};
 use crate::transfer::TransferFunction;
 use crate::transfer::colormap::ColorMap;
 use crate::view::{Blend, Camera, Projection};
@@ -24,23 +30,6 @@ const BANDS: usize = 7;
 /// Optical depth of the mean ray through the whole mesh, and that of the mesh's depth at opacity 1.
 const DEPTH: f64 = 1.6;
 const DEPTH_SOLID: f64 = 10.0;
-
-/// Arrays that hold names of things, not values (lower case).
-const NOT_VALUES: [&str; 13] = [
-    "vtkoriginalpointids",
-    "vtkoriginalcellids",
-    "globalnodeid",
-    "globalelementid",
-    "globalids",
-    "pedigreenodeid",
-    "pedigreeelementid",
-    "objectid",
-    "vtkghosttype",
-    "vtkghostlevels",
-    "vtkvalidpointmask",
-    "processid",
-    "partitionid",
-];
 
 /// What of the look somebody did say.
 #[derive(Debug, Clone, Default)]
@@ -81,40 +70,17 @@ impl Opacity {
     }
 }
 
-/// Whether an array, by its name, counts or marks things.
-fn is_id(name: &str) -> bool {
-    let name = name.to_lowercase();
-    NOT_VALUES.contains(&name.as_str()) || ["_id", "_ids", " id", " ids"].iter().any(|end| name.ends_with(end))
-}
-
-fn varies(array: &Array) -> bool {
-    let mut finite = (0..array.values.len()).map(|i| array.values.get(i)).filter(|v| v.is_finite());
-    let first = finite.next();
-    finite.any(|v| Some(v) != first)
-}
-
-/// The array that says most: real numbers before integers, points before cells, scalars before vectors.
+/// The array to draw; see [`chosen`]. Says in the log which, and why.
 ///
 /// # Errors
 /// [`Error::Field`] if there is no array.
+///
+/// [`Error::Field`]: crate::Error::Field
 pub fn scalars(mesh: &Mesh, of: Option<Association>) -> Result<Scalars> {
-    let points = mesh.point_arrays().iter().map(|a| (Association::Point, a));
-    let cells = mesh.cell_arrays().iter().map(|a| (Association::Cell, a));
-    let all = points.chain(cells).filter(|(a, _)| of.is_none_or(|of| of == *a));
-    let best = all.min_by_key(|(association, a)| {
-        let integer = !matches!(a.values, Values::F32(_) | Values::F64(_));
-        (is_id(&a.name), !varies(a), integer, *association == Association::Cell, a.components > 1)
-    });
-    let Some((association, array)) = best else {
-        let of = match of {
-            Some(Association::Point) => "points",
-            Some(Association::Cell) => "cells",
-            None => "points or cells",
-        };
-        return Err(Error::Field(format!("it has no array of {of}, so no values to draw")));
-    };
-    let component = if array.components > 1 { Component::Magnitude } else { Component::Index(0) };
-    Ok(Scalars { name: array.name.clone(), association: Some(association), component: Some(component) })
+    let (scalars, why) = chosen(mesh, of)?;
+    let of = if scalars.association == Some(Association::Cell) { "cells" } else { "points" };
+    tracing::info!("array \"{}\" of {of} is drawn: {why}", scalars.name);
+    Ok(scalars)
 }
 
 /// A view of the whole mesh: perspective, from the front right and above, z up.
@@ -158,7 +124,7 @@ pub fn bounds(mesh: &Mesh, tetrahedra: &Tetrahedra) -> (DVec3, DVec3) {
 pub fn scene(mesh: &Mesh, tetrahedra: &Tetrahedra, scalars: Scalars, field: &Field, wishes: Wishes) -> Result<Scene> {
     Ok(Scene {
         mesh: PathBuf::new(),
-        transfer: transfer(mesh, tetrahedra, &scalars.name, field, &wishes)?,
+        transfer: transfer(mesh, tetrahedra, &scalars, field, &wishes)?,
         scalars,
         camera: camera(mesh, tetrahedra),
         size: SIZE,
@@ -213,22 +179,6 @@ impl Sample {
         Sample { values, depth: if depth > 0.0 && depth.is_finite() { depth } else { 1.0 } }
     }
 
-    fn quantile(&self, q: f64) -> Option<f64> {
-        self.values.get(((self.values.len().max(1) - 1) as f64 * q) as usize).map(|v| v.0)
-    }
-
-    /// The range to show: that of the field, unless a few outliers stretch it.
-    fn range(&self, [lo, hi]: [f64; 2]) -> [f64; 2] {
-        if let (Some(a), Some(b)) = (self.quantile(0.01), self.quantile(0.99))
-            && b > a
-            && (hi - lo) > 4.0 * (b - a)
-        {
-            let margin = (b - a) / 10.0;
-            return [lo.max(a - margin), hi.min(b + margin)];
-        }
-        if hi > lo { [lo, hi] } else { [lo - 0.5 * lo.abs().max(1.0), hi + 0.5 * hi.abs().max(1.0)] }
-    }
-
     /// Soft bands of opacity. What fills the mesh is clearer than what is rare, so that no value hides the others;
     /// scaled so that the mean ray has the optical depth [`DEPTH`] at a unit distance of a [`DEPTH_SOLID`]th of the
     /// mesh.
@@ -272,12 +222,19 @@ impl Sample {
 fn transfer(
     mesh: &Mesh,
     tetrahedra: &Tetrahedra,
-    name: &str,
+    scalars: &Scalars,
     field: &Field,
     wishes: &Wishes,
 ) -> Result<TransferFunction> {
     let sample = Sample::new(mesh, tetrahedra, field);
-    let mut range = wishes.range.unwrap_or_else(|| sample.range(field.range(0)));
+    let (mut range, note) = match wishes.range {
+        Some(range) => (range, "as asked for".to_owned()),
+        None => {
+            let (range, note) = range(mesh, tetrahedra, scalars)
+                .unwrap_or_else(|| (field.range(0), "the values of the array".to_owned()));
+            (widened(range), note)
+        }
+    };
     let [lo, hi] = range;
     // Values on both sides of zero are told apart by colour.
     let signed = lo < 0.0 && hi > 0.0 && lo.abs().min(hi.abs()) > 0.25 * lo.abs().max(hi.abs());
@@ -302,8 +259,14 @@ fn transfer(
         let unit_scale = unit / (sample.depth / DEPTH_SOLID);
         opacity.iter_mut().for_each(|k| k.1 = rounded(k.1 * scale * unit_scale));
     }
-    tracing::info!("drawing \"{name}\" from {} to {}, unit distance {unit}", range[0], range[1]);
+    let name = &scalars.name;
+    tracing::info!("drawing \"{name}\" from {} to {} ({note}), unit distance {unit}", range[0], range[1]);
     TransferFunction::new(map.over(range), opacity, unit)
+}
+
+/// A range of a single value is made one around it.
+pub fn widened([lo, hi]: [f64; 2]) -> [f64; 2] {
+    if hi > lo { [lo, hi] } else { [lo - 0.5 * lo.abs().max(1.0), hi + 0.5 * hi.abs().max(1.0)] }
 }
 
 /// To three digits.

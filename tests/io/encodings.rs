@@ -1,7 +1,7 @@
 //! However numbers are written, they are read as they were meant.
 
 use super::files::{Mode, PLAIN, Piece, Style, array, ascii, piece, styles, write};
-use super::{assert_holds, coordinates, floats, malformed, read};
+use super::{assert_holds, coordinates, floats, read};
 use halite::mesh::Values;
 
 #[test]
@@ -179,5 +179,7 @@ fn data_with_more_bytes_than_numbers() {
     let start = bytes.windows(2).position(|w| w == b" _").unwrap() + 2;
     let stated = |value: u32| [&bytes[..start], &value.to_le_bytes(), &bytes[start + 4..]].concat();
     assert_holds(&read(&stated(0x42fa_0000)).unwrap(), &piece(), "too many");
-    assert!(malformed(&stated(39)).contains("PointData array \"T\": it holds 39 bytes, but its numbers need 40"));
+    let short = read(&stated(39)).unwrap();
+    let why = short.point_attributes().why_left_out("T").unwrap();
+    assert!(why.contains("PointData array \"T\": it holds 39 bytes, but its numbers need 40"), "{why}");
 }

@@ -110,20 +110,135 @@ fn damaged_legacy_files() {
     };
     told("4 1 2 3 4\n", "4 1 2 3 5\n", "cell 1 names point 5");
     told("4 1 2 3 4\n", "5 1 2 3 4\n", "cell 1 has more points");
-    told("SCALARS id int 1\n", "SCALARS id int 2\n", "array \"id\", at byte 172: \"POINT_DATA\" is not a number");
-    told(
-        "SCALARS id int 1\nLOOKUP_TABLE default\n7 8\n",
-        "SCALARS id quad 1\n7 8\n",
-        "there is no number type \"quad\"",
-    );
-    told("FIELD FieldData", "FOUNTAIN FieldData", "FOUNTAIN, at byte 278: Halite does not know such a section");
-    told("T 1 5", "T 1 6", "array \"T\", at byte 278: it holds 5 numbers, not 6");
-    told("T 1 5", "T 1 18446744073709551615", "it holds 5 numbers");
-    told("T 1 5", "T 2 18446744073709551615", "more values than any file can hold");
-    told("POINTS 5", "POINTS 4000000000", "POINTS, at byte 65: \"CELLS\" is not a number");
-    told("CELL_DATA 2", "CELLS_DATA 2", "CELLS_DATA, at byte");
+    told("CELLS 2 10", "CELLS 3 10", "it says 3 cells, and its 10 numbers are 2");
+    told("CELLS 2 10", "CELLS 2 11", "CELLS, at byte 110: it holds 10 numbers, not 11: CELL_TYPES follows");
+    told("CELLS 2 10", "CELLS 2 9", "cell 1 has more points");
+    told("CELL_TYPES 2\n10 10\n", "CELL_TYPES 1\n10\n", "CELL_TYPES has 1 types where there are 2 CELLS");
+    told("CELL_TYPES 2\n10 10\n", "CELL_TYPES 2\n10 10 10\n", "it holds more numbers than it says");
+    told("POINTS 5", "POINTS 4000000000", "POINTS, at byte 65: it holds 15 numbers, not 12000000000: CELLS follows");
+    told("POINTS 5", "POINTS 4", "POINTS, at byte 65: it holds more numbers than it says");
+    told("POINT_DATA 5", "POINT_DATA 4", "POINT_DATA has 4 tuples where there are 5 points");
+    told("CELL_DATA 2", "CELL_DATA 3", "CELL_DATA has 3 tuples where there are 2 cells");
     told("ASCII", "EBCDIC", "its third line is \"EBCDIC\"");
     told("ASCII", "BINARY", ", at byte");
     told("DATASET", "DATA", "no data set");
-    told("1 2 3 4 5\n", "1 2 3 4 5\n1e\n", "1E, at byte");
+}
+
+/// What is wrong with data is left out by name, and the rest is read.
+#[test]
+fn damaged_data_of_legacy_files() {
+    let whole = read_as("mesh.vtk", LEGACY.as_bytes()).unwrap();
+    let arrays = |mesh: &halite::mesh::Mesh| -> Vec<String> {
+        mesh.cell_arrays().iter().chain(mesh.point_arrays()).map(|a| a.name.clone()).collect()
+    };
+    assert_eq!(arrays(&whole), ["id", "v x", "T"]);
+    let told = |from: &str, to: &str, kept: &[&str], lost: &str, expected: &str| {
+        assert!(LEGACY.contains(from), "{from}");
+        let mesh = read_as("mesh.vtk", LEGACY.replacen(from, to, 1).as_bytes()).unwrap();
+        assert_eq!(arrays(&mesh), kept, "{from} -> {to}");
+        for array in mesh.cell_arrays().iter().chain(mesh.point_arrays()) {
+            assert!(whole.cell_arrays().contains(array) || whole.point_arrays().contains(array), "{from} -> {to}");
+        }
+        let why = [mesh.point_attributes(), mesh.cell_attributes()]
+            .iter()
+            .find_map(|a| a.why_left_out(lost).map(str::to_owned));
+        assert!(lost.is_empty() || why.as_ref().is_some_and(|why| why.contains(expected)), "{from} -> {to}: {why:?}");
+        let asked = halite::field::Field::new(&mesh, lost, None, halite::field::Component::Index(0));
+        assert!(lost.is_empty() || asked.unwrap_err().to_string().contains(expected), "{from} -> {to}");
+    };
+    told("SCALARS id int 1", "SCALARS id int 2", &["v x", "T"], "id", "2 numbers, not 4: POINT_DATA follows");
+    told("SCALARS id int 1", "SCALARS id quad 1", &["v x", "T"], "id", "there is no number type \"quad\"");
+    told("7 8\n", "7\n", &["v x", "T"], "id", "1 numbers, not 2");
+    told("7 8\n", "7 8 9\n", &["v x", "T"], "id", "more numbers");
+    told("7 8\n", "7 x\n", &["v x", "T"], "id", "\"x\" is not a number");
+    told("VECTORS v%20x double", "VECTORS v%20x single", &["id", "T"], "v x", "there is no number type");
+    told("1 1 2 2 2\n", "1 1 2 2\n", &["id", "T"], "v x", "14 numbers, not 15: FIELD follows");
+    told("FIELD FieldData", "FOUNTAIN FieldData", &["id", "v x"], "", "");
+    told("T 1 5", "T 1 6", &["id", "v x"], "T", "it holds 5 numbers, not 6");
+    told("4 5\n", "4 5 6\n", &["id", "v x"], "T", "more numbers");
+    told("T 1 5", "T 1 4", &["id", "v x"], "T", "4 tuples of 1 numbers where 5 are needed");
+    told("T 1 5", "T 1 18446744073709551615", &["id", "v x"], "T", "it holds 5 numbers");
+    told("T 1 5", "T 2 18446744073709551615", &["id", "v x"], "T", "more values than any file can hold");
+    told("CELL_DATA 2", "EDGE_DATA 2", &["v x", "T"], "id", "before POINT_DATA or CELL_DATA");
+    told("1 2 3 4 5\n", "1 2 3 4 5\n1e\n", &["id", "v x", "T"], "", "");
+    told("1 2 3 4 5\n", "1 2 3 4 5\nNOTES 3\nof somebody\n", &["id", "v x", "T"], "", "");
+    let two = "FIELD FieldData 3\nT2 1 5 float\n1 2 3 4\nP7 1 5 int\n1 2 3 4 5 6\nT 1 5 float";
+    told("FIELD FieldData 1\nT 1 5 float", two, &["id", "v x", "T"], "T2", "\"P7\" is not a number");
+    told("FIELD FieldData 1\nT 1 5 float", two, &["id", "v x", "T"], "P7", "more numbers");
+    told("FIELD FieldData 1", "FIELD FieldData 7", &["id", "v x", "T"], "", "");
+}
+
+#[test]
+fn damaged_data_of_binary_legacy_files() {
+    let floats = |count: usize| -> Vec<u8> { (0..count).flat_map(|i| (i as f32 + 0.5).to_be_bytes()).collect() };
+    let file = |stated: &str, count: usize| {
+        let mut file = b"# vtk DataFile Version 4.2\nt\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n".to_vec();
+        file.extend([0f32, 0., 0., 1., 0., 0., 0., 1., 0., 0., 0., 1.].iter().flat_map(|x| x.to_be_bytes()));
+        file.extend(b"\nCELLS 1 5\n");
+        file.extend([4i32, 0, 1, 2, 3].iter().flat_map(|x| x.to_be_bytes()));
+        file.extend(b"\nCELL_TYPES 1\n\0\0\0\n\nPOINT_DATA 4\n");
+        file.extend(format!("SCALARS a {stated} 1\nLOOKUP_TABLE default\n").bytes());
+        file.extend(floats(count));
+        file.extend(b"\nVECTORS v float\n");
+        file.extend(floats(12));
+        file.extend(format!("\nFIELD FieldData 2\nb 1 4 {stated}\n").bytes());
+        file.extend(floats(count));
+        file.extend(b"\nc 1 4 float\n");
+        file.extend(floats(4));
+        file.extend(b"\n");
+        file
+    };
+    let names = |bytes: &[u8]| -> Vec<String> {
+        let mesh = read_as("mesh.vtk", bytes).unwrap();
+        mesh.point_arrays().iter().map(|a| a.name.clone()).collect()
+    };
+    assert_eq!(names(&file("float", 4)), ["a", "v", "b", "c"]);
+    for (stated, count) in [("float", 3), ("float", 6), ("double", 4), ("unsigned_char", 4), ("quad", 4), ("float", 0)]
+    {
+        assert_eq!(names(&file(stated, count)), ["v", "c"], "{stated} {count}");
+    }
+    // What programs leave at the end of files does no harm, nor does a section that nobody knows.
+    for end in [&b"\0\0"[..], b"EXTRA_DATA 3\n\x01\x02\x03", b"\x1a"] {
+        let mut bytes = file("float", 4);
+        bytes.extend(end);
+        assert_eq!(names(&bytes)[..3], ["a", "v", "b"], "{end:?}");
+    }
+}
+
+/// Lines that end as on old Macs, and on others.
+#[test]
+fn line_ends() {
+    let whole = read_as("mesh.vtk", LEGACY.as_bytes()).unwrap();
+    for end in ["\r", "\r\n"] {
+        assert_eq!(read_as("mesh.vtk", LEGACY.replace('\n', end).as_bytes()).unwrap(), whole, "{end:?}");
+        // Numbers that are line ends are numbers.
+        let mut file = "# vtk DataFile Version 4.2\nt\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS 1 int\n"
+            .replace('\n', end)
+            .into_bytes();
+        file.extend([10, 13, 10, 13, 13, 13, 10, 10, 10, 0, 0, 13]);
+        file.extend(format!("{end}CELLS 1 2{end}\0\0\0\x01\0\0\0\0{end}CELL_TYPES 1{end}\0\0\0\x01{end}").bytes());
+        file.extend(format!("POINT_DATA 1{end}SCALARS s char 1{end}LOOKUP_TABLE default{end}\r{end}").bytes());
+        let mesh = read_as("mesh.vtk", &file).unwrap();
+        assert_eq!(mesh.points()[0].z, f64::from(i32::from_be_bytes([10, 0, 0, 13])), "{end:?}");
+        assert_eq!(mesh.point_arrays()[0].values, Values::I8(vec![13]), "{end:?}");
+    }
+}
+
+#[test]
+fn sections_of_data_in_any_sequence() {
+    let (base, _) = LEGACY.split_once("CELL_DATA").unwrap();
+    let a = "CELL_DATA 2\nSCALARS a int\nLOOKUP_TABLE default\n1 2\n";
+    let b = "CELL_DATA 2\nVECTORS b float\n1 2 3 4 5 6\nFIELD f 1\nd 1 2 int\n5 6\n";
+    let p = "POINT_DATA 5\nSCALARS p float\nLOOKUP_TABLE default\n1 2 3 4 5\n";
+    let q = "POINT_DATA 5\nCOLOR_SCALARS q 3\n0 0 0 1 1 1 0.5 0.2 0.4 0 0 0 0 0 0\n";
+    for order in [[a, p, b, q], [p, a, q, b], [a, b, p, q], [q, p, b, a], [p, b, a, q]] {
+        let mesh = read_as("mesh.vtk", format!("{base}{}", order.concat()).as_bytes()).unwrap();
+        let mut names: Vec<&str> = mesh.cell_arrays().iter().chain(mesh.point_arrays()).map(|a| &*a.name).collect();
+        names.sort_unstable();
+        assert_eq!(names, ["a", "b", "d", "p", "q"]);
+        let q = mesh.point_arrays().iter().find(|a| a.name == "q").unwrap();
+        let Values::U8(bytes) = &q.values else { panic!("{q:?}") };
+        assert_eq!((q.components, &bytes[..9]), (3, &[0, 0, 0, 255, 255, 255, 128, 51, 102][..]));
+        assert_eq!(mesh.cell_attributes().role("a"), Some(halite::mesh::Role::Scalars));
+    }
 }

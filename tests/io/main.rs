@@ -6,8 +6,10 @@ mod damage;
 mod encodings;
 #[path = "../common/files.rs"]
 mod files;
+mod left_out;
 mod legacy;
 mod pieces;
+mod series;
 #[path = "../common/shared.rs"]
 mod shared;
 

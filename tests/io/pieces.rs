@@ -78,10 +78,7 @@ fn lists_of_files() {
         let error = halite::io::open(&path, &|_| ()).unwrap_err().to_string();
         assert!(parts.iter().all(|part| error.contains(part)), "{error}");
     };
-    fails(
-        &[("a.vtu", write(PLAIN, &[piece()])), ("gone.vtu", vec![])],
-        &["mesh.pvtu: it lists", "gone.vtu", "cannot be read"],
-    );
+    fails(&[("gone.vtu", vec![]), ("sub/gone.vtu", vec![])], &["mesh.pvtu: it lists", "gone.vtu", "cannot be read"]);
     fails(
         &[("a.vtu", b"<VTKFile type='PUnstructuredGrid'><PUnstructuredGrid/></VTKFile>".to_vec())],
         &["a.vtu", "no <Piece>"],
@@ -89,6 +86,40 @@ fn lists_of_files() {
     fails(&[("mesh.pvtu", vec![])], &["which is a list itself"]);
     fails(&[("a.vtu", ascii(&[piece()]).replace(" 4 10\n", " 4 11\n").into_bytes())], &["a.vtu: Cells array"]);
     fails(&[], &["no <Piece>"]);
+}
+
+/// Files that are missing are left out; those that were moved are found beside the list.
+#[test]
+fn missing_and_moved_files() {
+    let (folder, path) = list_of(&[("a.vtu", write(PLAIN, &[piece()])), ("gone.vtu", vec![])]);
+    assert_eq!(halite::io::open(&path, &|_| ()).unwrap().points().len(), 10);
+    std::fs::create_dir_all(folder.path().join("out/parts")).unwrap();
+    let there = folder.path().join("out/parts/b.vtu");
+    std::fs::write(&there, write(PLAIN, &[piece(), piece()])).unwrap();
+    let moved = |source: &str| {
+        let list = folder.path().join("out/mesh.pvtu");
+        let text = format!(
+            "<VTKFile type='PUnstructuredGrid'><PUnstructuredGrid><Piece Source='{source}'/></PUnstructuredGrid></VTKFile>"
+        );
+        std::fs::write(&list, text).unwrap();
+        halite::io::open(&list, &|_| ()).map(|mesh| mesh.points().len()).ok()
+    };
+    let absolute = there.display().to_string();
+    for source in [
+        "parts/b.vtu",
+        "./parts/b.vtu",
+        "parts\\b.vtu",
+        &absolute,
+        "/home/somebody/run/parts/b.vtu",
+        "C:\\Users\\somebody\\run\\parts\\b.vtu",
+        "../../elsewhere/parts/b.vtu",
+        "old/parts/b.vtu",
+    ] {
+        assert_eq!(moved(source), Some(20), "{source}");
+    }
+    assert_eq!(moved("parts/c.vtu"), None);
+    std::fs::copy(&there, folder.path().join("out/b.vtu")).unwrap();
+    assert_eq!(moved("/home/somebody/elsewhere/b.vtu"), Some(20));
 }
 
 /// A pyramid as a polyhedron, a tetrahedron, and another pyramid on the first one's base.

@@ -1,4 +1,4 @@
-use crate::{output, progress};
+use crate::{input, output, parse, progress};
 use anyhow::Result;
 use clap::Args;
 use halite::field::Association;
@@ -6,19 +6,25 @@ use halite::geometry::Geometry;
 use halite::geometry::contacts::Contacts;
 use halite::mesh::cells::{self, Tetrahedra};
 use halite::mesh::faces::Faces;
-use halite::mesh::{Array, Mesh, Values};
+use halite::mesh::{Array, Attributes, LeftOut, Mesh, Role, Values};
 use halite::scene::automatic;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::PathBuf;
 
+/// So many time steps are listed one by one.
+const MOST_STEPS: usize = 24;
+
 /// Tell what a mesh holds, and what of it would be drawn; or which devices there are
 #[derive(Args)]
 pub(crate) struct Options {
     /// The mesh
-    #[arg(value_name = "MESH.vtu", required_unless_present = "devices")]
+    #[arg(value_name = "MESH.vtu|-", required_unless_present = "devices")]
     mesh: Option<PathBuf>,
+    /// The time step: its number from 0, a time such as 2.0, or "last" [default: the first]
+    #[arg(long, value_name = "STEP|TIME", value_parser = parse::time, allow_hyphen_values = true, conflicts_with = "devices")]
+    time: Option<halite::io::Time>,
     /// List the devices that `render --device` knows, by index
     #[arg(long, conflicts_with = "mesh")]
     devices: bool,
@@ -27,8 +33,11 @@ pub(crate) struct Options {
 pub(crate) fn run(options: &Options) -> Result<()> {
     let mut text = String::new();
     if let Some(path) = &options.mesh {
-        let mesh = progress::during("reading", |p| halite::io::open(path, p))?;
-        describe(&mut text, &path.display().to_string(), &mesh)?;
+        let source = input::source(path)?;
+        let step = options.time.map_or(Ok(0), |time| source.step(time))?;
+        let mesh = progress::during("reading", |p| source.read(step, p))?;
+        let name = if input::is_standard(path) { "standard input".to_owned() } else { path.display().to_string() };
+        describe(&mut text, &name, &mesh, (source.times(), step))?;
     } else {
         list_devices(&mut text)?;
     }
@@ -48,7 +57,49 @@ fn list_devices(out: &mut String) -> Result<()> {
     Ok(writeln!(out, "cpu  {} threads", rayon::current_num_threads())?)
 }
 
-fn describe(out: &mut String, name: &str, mesh: &Mesh) -> Result<()> {
+/// The time steps that a file has, of which `at` is what is described.
+fn list_steps(out: &mut String, times: &[f64], at: usize) -> Result<()> {
+    if times.is_empty() {
+        return Ok(());
+    }
+    writeln!(out, "\ntime steps")?;
+    for (step, time) in times.iter().enumerate() {
+        // Of many, those around the ends and this one.
+        if times.len() <= MOST_STEPS || step < 3 || step + 3 >= times.len() || step.abs_diff(at) <= 1 {
+            let note = if step == at { "  described here" } else { "" };
+            writeln!(out, "  {step:>12}  {time}{note}")?;
+        } else if step == 3 || step == at + 2 {
+            writeln!(out, "  {:>12}", "...")?;
+        }
+    }
+    Ok(())
+}
+
+/// The arrays of points, or of cells.
+fn list_arrays(out: &mut String, what: &str, arrays: &[Array], known: &Attributes) -> Result<()> {
+    if arrays.is_empty() && known.left_out.is_empty() {
+        return Ok(());
+    }
+    writeln!(out, "\n{what}")?;
+    let names = arrays.iter().map(|a| &a.name).chain(known.left_out.iter().map(|a| &a.name));
+    let wide = names.map(|name| name.chars().count()).max().unwrap_or(0).min(40);
+    for a in arrays {
+        let kind = if a.components > 1 {
+            format!("{} x {}", a.components, type_name(&a.values))
+        } else {
+            type_name(&a.values).into()
+        };
+        let role = known.role(&a.name).and_then(|role| Role::ALL.iter().find(|(of, _)| *of == role));
+        let note = role.map_or(String::new(), |(_, name)| format!("   ({name})"));
+        writeln!(out, "  {:wide$}  {kind:8}  {}{note}", a.name, ranges(a).join("   "))?;
+    }
+    for LeftOut { name, why } in &known.left_out {
+        writeln!(out, "  {name:wide$}  left out: {why}")?;
+    }
+    Ok(())
+}
+
+fn describe(out: &mut String, name: &str, mesh: &Mesh, (times, step): (&[f64], usize)) -> Result<()> {
     writeln!(out, "{name}: {} cells, {} points", mesh.cells().len(), mesh.points().len())?;
     let finite = mesh.points().iter().filter(|p| p.is_finite());
     let (lo, hi) =
@@ -79,21 +130,9 @@ fn describe(out: &mut String, name: &str, mesh: &Mesh) -> Result<()> {
         writeln!(out, "  {count:>12}  {}{note}", cells::name(t))?;
     }
 
-    for (what, arrays) in [("point arrays", mesh.point_arrays()), ("cell arrays", mesh.cell_arrays())] {
-        if arrays.is_empty() {
-            continue;
-        }
-        writeln!(out, "\n{what}")?;
-        let wide = arrays.iter().map(|a| a.name.chars().count()).max().unwrap_or(0).min(40);
-        for a in arrays {
-            let kind = if a.components > 1 {
-                format!("{} x {}", a.components, type_name(&a.values))
-            } else {
-                type_name(&a.values).into()
-            };
-            writeln!(out, "  {:wide$}  {kind:8}  {}", a.name, ranges(a).join("   "))?;
-        }
-    }
+    list_steps(out, times, step)?;
+    list_arrays(out, "point arrays", mesh.point_arrays(), mesh.point_attributes())?;
+    list_arrays(out, "cell arrays", mesh.cell_arrays(), mesh.cell_attributes())?;
 
     writeln!(out, "\ndrawn")?;
     let tetrahedra = match split {
@@ -130,14 +169,14 @@ fn describe(out: &mut String, name: &str, mesh: &Mesh) -> Result<()> {
     };
     row(contacts.touching, &format!("boundary faces that lie on other cells without sharing a face{of}"))?;
     row(contacts.overlapping, &format!("boundary faces inside other cells: cells overlap{of}"))?;
-    let choice = automatic::scalars(mesh, None).ok();
-    let tuples = match choice.as_ref().and_then(|scalars| scalars.association) {
+    let choice = automatic::chosen(mesh, None).ok();
+    let tuples = match choice.as_ref().and_then(|(scalars, _)| scalars.association) {
         Some(Association::Cell) => tetrahedra.corners.len(),
         _ => points.len(),
     };
     writeln!(out, "  {} of memory to render one scalar", size((geometry.bytes() + 4 * tuples as u64) as f64))?;
-    if let Some(scalars) = choice {
-        writeln!(out, "  \"{}\" if no other array is asked for", scalars.name)?;
+    if let Some((scalars, why)) = choice {
+        writeln!(out, "  \"{}\" if no other array is asked for: {why}", scalars.name)?;
     }
     Ok(())
 }

@@ -4,6 +4,7 @@ mod bench;
 mod camera;
 mod demo;
 mod info;
+mod input;
 mod integral;
 mod output;
 mod parse;

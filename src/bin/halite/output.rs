@@ -1,8 +1,10 @@
 //! What the program says and writes.
 
+use crate::input::is_standard;
 use anyhow::{Context, Result, bail};
-use std::io::{ErrorKind, Write};
-use std::path::Path;
+use halite::image::{Backdrop, Image};
+use std::io::{ErrorKind, IsTerminal, Write};
+use std::path::{Path, PathBuf};
 
 /// The endings that a picture can have.
 const PICTURES: [&str; 3] = ["png", "exr", "npy"];
@@ -24,6 +26,35 @@ pub(crate) fn print(text: &str) -> Result<()> {
     match std::io::stdout().write_all(text.as_bytes()) {
         Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(e).context("stdout"),
         _ => Ok(()),
+    }
+}
+
+/// Writes a picture to `path`, or as `format` to stdout.
+pub(crate) fn picture(image: &Image, path: &Path, format: &str, backdrop: Backdrop) -> Result<()> {
+    if !is_standard(path) {
+        return Ok(image.save(path, backdrop)?);
+    }
+    let bytes = image.encode(format, backdrop)?;
+    let mut out = std::io::stdout().lock();
+    out.write_all(&bytes).and_then(|()| out.flush()).context("stdout")
+}
+
+/// The path of the picture of a time step, of `count`: `name_0007.png` for `name.png`.
+pub(crate) fn numbered(path: &Path, step: usize, count: usize) -> PathBuf {
+    let digits = count.saturating_sub(1).to_string().len().max(4);
+    let part = |part: Option<&std::ffi::OsStr>| part.unwrap_or_default().to_string_lossy().into_owned();
+    path.with_file_name(format!("{}_{step:0digits$}.{}", part(path.file_stem()), part(path.extension())))
+}
+
+/// As [`check_picture`], where stdout may take a picture, too: a format is what that gets.
+pub(crate) fn check_stream(path: &Path, format: Option<&str>) -> Result<()> {
+    match format {
+        _ if is_standard(path) && std::io::stdout().is_terminal() => {
+            bail!("stdout is a terminal, which shows no pictures: --out FILE.png, or > FILE.png")
+        }
+        _ if is_standard(path) => Ok(()),
+        Some(_) => Err(misuse("--format says what standard output gets (--out -); files are what their endings say")),
+        None => check_picture(path),
     }
 }
 

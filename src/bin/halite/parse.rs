@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 use halite::field::Component;
+use halite::io::Time;
 use halite::scene::automatic::{Opacity, Place};
 use halite::view::ClippingPlane;
 
@@ -58,6 +59,15 @@ pub(crate) fn component(text: &str) -> Result<Component, String> {
     }
 }
 
+/// A step, from 0; a time, which has a point or an exponent; or `last`
+pub(crate) fn time(text: &str) -> Result<Time, String> {
+    match (text, text.trim().parse()) {
+        ("last", _) => Ok(Time::Last),
+        (_, Ok(step)) => Ok(Time::Step(step)),
+        _ => number(text).map(Time::Value),
+    }
+}
+
 /// What an 8-bit picture shows behind the volume: a colour, or nothing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Background {
@@ -109,6 +119,11 @@ mod tests {
     fn values() {
         assert_eq!(size("640x480"), Ok([640, 480]));
         assert_eq!(range("-1:2.5"), Ok([-1.0, 2.5]));
+        assert_eq!(
+            (time("2"), time("2.0"), time("-1e3")),
+            (Ok(Time::Step(2)), Ok(Time::Value(2.0)), Ok(Time::Value(-1e3)))
+        );
+        assert!(time("last") == Ok(Time::Last) && time("soon").is_err() && time("nan").is_err());
         assert_eq!(component("2"), Ok(Component::Index(2)));
         assert_eq!(vector("1,-2, 3"), Ok(DVec3::new(1.0, -2.0, 3.0)));
         assert_eq!(background("0,0.5,1"), Ok(Background::Color([0.0, 0.5, 1.0])));

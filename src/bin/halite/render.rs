@@ -1,17 +1,18 @@
-use crate::{camera, integral, output, parse, progress, variant};
+use crate::{camera, input, integral, output, parse, progress, variant};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use halite::field::{Association, Component, Field};
 use halite::gpu::DeviceChoice;
 use halite::image::{Backdrop, Image};
 use halite::integral::choice::{Choice, Form};
+use halite::io::Time;
 use halite::mesh::{Mesh, cells::Tetrahedra};
 use halite::project::Switches;
 use halite::render::{self, Renderer, Stats};
 use halite::scene::{Scalars, Scene, automatic};
 use halite::transfer::TransferFunction;
 use halite::transfer::colormap::ColorMap;
-use halite::view::{Blend, ClippingPlane};
+use halite::view::{Blend, Camera, ClippingPlane};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -23,9 +24,15 @@ use std::time::Instant;
 pub(crate) struct Options {
     #[command(flatten)]
     request: Request,
-    /// The picture: .png (8-bit), .exr or .npy (linear premultiplied RGBA, 32-bit float)
-    #[arg(short, long, value_name = "FILE")]
+    /// The picture: .png (8-bit), .exr or .npy (linear premultiplied RGBA, 32-bit float); - is standard output
+    #[arg(short, long, value_name = "FILE|-")]
     out: PathBuf,
+    /// What standard output gets [default: png]
+    #[arg(long, value_name = "FORMAT", value_parser = ["png", "exr", "npy"])]
+    format: Option<String>,
+    /// Draw all time steps into pictures with numbers, name_0000.png and so on, with one range of colours
+    #[arg(long, conflicts_with = "time")]
+    all_times: bool,
     /// Write what was done, and the time and memory it took, as JSON
     #[arg(long, value_name = "FILE")]
     stats: Option<PathBuf>,
@@ -34,9 +41,12 @@ pub(crate) struct Options {
 /// What to draw, and how.
 #[derive(Args)]
 pub(crate) struct Request {
-    /// The mesh, or the scene that describes it (.json)
-    #[arg(value_name = "MESH.vtu|SCENE.json")]
+    /// The mesh, or the scene that describes it (.json); - is standard input, for either
+    #[arg(value_name = "MESH.vtu|SCENE.json|-")]
     input: PathBuf,
+    /// The time step: its number from 0, a time such as 2.0, or "last" [default: the first]
+    #[arg(long, value_name = "STEP|TIME", value_parser = parse::time, allow_hyphen_values = true)]
+    time: Option<Time>,
     /// Width and height in pixels [default: the scene's, or 1024x768]
     #[arg(long, value_name = "WxH", value_parser = parse::size)]
     size: Option<[u32; 2]>,
@@ -118,22 +128,79 @@ impl From<Engine> for render::Engine {
 }
 
 pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
-    output::check_picture(&options.out)?;
+    output::check_stream(&options.out, options.format.as_deref())?;
     if let Some(path) = &options.stats {
         output::check(path)?;
     }
     let request = &options.request;
     let given = request.scene()?;
     let mut renderer = request.renderer(threads, given.as_ref(), request.device(given.as_ref()))?;
-    let job = renderer.install(|| prepare(request, given))?;
-    let background = job.scene.background;
-    let drawn = draw(job, &mut renderer)?;
-    drawn.image.save(&options.out, backdrop(background, drawn.behind.as_deref()))?;
+    let report = if options.all_times {
+        all_times(options, given, &mut renderer)?
+    } else {
+        let job = renderer.install(|| prepare(request, given))?;
+        picture(options, &options.out, job, &mut renderer)?
+    };
     if let Some(path) = &options.stats {
-        let text = format!("{:#}\n", drawn.report());
-        std::fs::write(path, text).with_context(|| path.display().to_string())?;
+        std::fs::write(path, format!("{report:#}\n")).with_context(|| path.display().to_string())?;
     }
     Ok(())
+}
+
+/// Draws a picture into a file, and says what it took.
+fn picture(options: &Options, out: &Path, job: Job, renderer: &mut Renderer) -> Result<serde_json::Value> {
+    let background = job.scene.background;
+    let drawn = draw(job, renderer)?;
+    let format = options.format.as_deref().unwrap_or("png");
+    output::picture(&drawn.image, out, format, backdrop(background, drawn.behind.as_deref()))?;
+    Ok(drawn.report())
+}
+
+/// Draws all time steps, with the colours, opacities and view of the first over the range of all.
+fn all_times(options: &Options, given: Option<Scene>, renderer: &mut Renderer) -> Result<serde_json::Value> {
+    let request = &options.request;
+    if input::is_standard(&options.out) {
+        return Err(output::misuse("--all-times: standard output takes one picture; --out FILE.png names all of them"));
+    }
+    let path = given.as_ref().map_or(&request.input, |scene| &scene.mesh);
+    let count = input::source(path)?.times().len().max(1);
+    let mut steps = Steps::default();
+    if given.is_none() && request.range.is_none() {
+        steps.range = renderer.install(|| range_of_all(request, count))?;
+    }
+    let mut reports = vec![];
+    for step in 0..count {
+        steps.time = Some(Time::Step(step));
+        let job = renderer.install(|| prepare_step(request, given.clone(), &mut steps))?;
+        reports.push(picture(options, &output::numbered(&options.out, step, count), job, renderer)?);
+    }
+    Ok(reports.into())
+}
+
+/// The range that the values of all time steps have where they are drawn.
+fn range_of_all(request: &Request, count: usize) -> Result<Option<[f64; 2]>> {
+    let (mut all, mut scalars) = (None::<[f64; 2]>, None);
+    for step in 0..count {
+        let mesh = input::mesh(&request.input, Some(Time::Step(step)))?;
+        let tetrahedra = Tetrahedra::new(&mesh).with_context(|| request.input.display().to_string())?;
+        let scalars = match &scalars {
+            Some(first) => first,
+            None => scalars.insert(request.scalars(None, &mesh)?),
+        };
+        if let Some((range, _)) = automatic::range(&mesh, &tetrahedra, scalars) {
+            all = Some(all.map_or(range, |all| [all[0].min(range[0]), all[1].max(range[1])]));
+        }
+    }
+    Ok(all.map(automatic::widened))
+}
+
+/// What is the same for all time steps, once the first is known.
+#[derive(Default)]
+pub(crate) struct Steps {
+    time: Option<Time>,
+    range: Option<[f64; 2]>,
+    scalars: Option<Scalars>,
+    look: Option<(TransferFunction, Camera)>,
 }
 
 /// Everything that a picture takes, and how long it took to get.
@@ -147,30 +214,41 @@ pub(crate) struct Job {
 }
 
 pub(crate) fn prepare(options: &Request, given: Option<Scene>) -> Result<Job> {
+    prepare_step(options, given, &mut Steps { time: options.time, ..Steps::default() })
+}
+
+fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut Steps) -> Result<Job> {
     let map = options.colormap.as_deref().map(color_map).transpose()?;
     let from_file = given.is_some();
     let start = Instant::now();
     let path = given.as_ref().map_or(options.input.clone(), |scene| scene.mesh.clone());
-    let mesh = progress::during("reading", |p| halite::io::open(&path, p))?;
+    let mesh = input::mesh(&path, steps.time)?;
     let load_ms = ms(start);
     let start = Instant::now();
     let tetrahedra = Tetrahedra::new(&mesh).with_context(|| path.display().to_string())?;
     let split_ms = ms(start);
     tetrahedra.skipped.log();
 
-    let scalars = options.scalars(given.as_ref(), &mesh)?;
+    let scalars = match &steps.scalars {
+        Some(scalars) => scalars.clone(),
+        None => options.scalars(given.as_ref(), &mesh)?,
+    };
+    steps.scalars = Some(scalars.clone());
     let field = scalars.field(&mesh).with_context(|| path.display().to_string())?;
     let mut scene = match given {
         Some(scene) => options.restyled(scene, map)?,
         None => {
             let wishes = automatic::Wishes {
-                range: options.range,
+                range: options.range.or(steps.range),
                 map,
                 opacity: options.opacity.clone(),
                 unit_distance: options.unit_distance,
                 blend: options.blend().unwrap_or_default(),
             };
-            automatic::scene(&mesh, &tetrahedra, scalars, &field, wishes)?
+            let mut scene = automatic::scene(&mesh, &tetrahedra, scalars, &field, wishes)?;
+            let look = steps.look.get_or_insert_with(|| (scene.transfer.clone(), scene.camera));
+            (scene.transfer, scene.camera) = look.clone();
+            scene
         }
     };
     scene.size = options.size.unwrap_or(scene.size);
@@ -189,10 +267,7 @@ pub(crate) fn prepare(options: &Request, given: Option<Scene>) -> Result<Job> {
 impl Request {
     /// The scene that the input is, if it is one.
     pub(crate) fn scene(&self) -> Result<Option<Scene>> {
-        if !self.input.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) {
-            return Ok(None);
-        }
-        let scene = Scene::open(&self.input)?;
+        let Some(scene) = input::scene(&self.input)? else { return Ok(None) };
         check_engine(&scene).with_context(|| self.input.display().to_string())?;
         Ok(Some(scene))
     }

@@ -1,14 +1,16 @@
 //! What vtkio parses of a legacy file.
 
-use super::{Parts, decoded};
+use super::Parts;
+use super::data::decoded;
 use crate::mesh::{Array, Values};
 use glam::DVec3;
 use std::panic::catch_unwind;
 use vtkio::model::{Attribute, CellType, DataSet, ElementType, IOBuffer, Piece, VertexNumbers};
 
 impl Parts {
-    /// The grid in `bytes`, if vtkio parses all of it and keeps each array. It panics on some input, and stops without
-    /// a word before what it does not know: NaN in text, ids, types that are not C's, field data before the points.
+    /// The grid in `bytes`, if vtkio parses all of it and keeps each array that it finds. It panics on some input, stops
+    /// without a word before what it does not know (NaN in text, ids, types that are not C's, field data before the
+    /// points), and forgets all but the last section of data of points and of cells: so it is asked last.
     pub(super) fn parsed(bytes: &[u8]) -> Option<Self> {
         let (rest, vtk) = catch_unwind(|| vtkio::parser::parse_be(bytes).ok()).ok().flatten()?;
         if !rest.is_empty() {
@@ -21,13 +23,14 @@ impl Parts {
         let points: Vec<DVec3> = (0..coordinates.len() / 3).map(point).collect();
         let types: Vec<u8> = piece.cells.types.iter().map(|kind: &CellType| *kind as u8).collect();
         let arrays = [arrays(piece.data.point, points.len())?, arrays(piece.data.cell, types.len())?];
-        let mut parts = Parts { points, types, arrays, ..Parts::default() };
+        let mut parts = Parts { points: Some(points), types: Some(types), arrays, ..Parts::default() };
         match piece.cells.cell_verts {
-            VertexNumbers::Legacy { vertices, .. } => parts.unpack(&vertices).ok()?,
+            VertexNumbers::Legacy { num_cells, vertices } => parts.unpack(&vertices, num_cells as usize).ok()?,
             VertexNumbers::XML { connectivity, offsets } => {
                 // An index that does not fit is out of range in any case.
                 let narrow = |point: u64| u32::try_from(point).unwrap_or(u32::MAX);
-                (parts.offsets, parts.connectivity) = (offsets, connectivity.into_iter().map(narrow).collect());
+                parts.offsets = Some(offsets);
+                parts.connectivity = connectivity.into_iter().map(narrow).collect();
             }
         }
         Some(parts)
@@ -75,7 +78,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_vtkio_would_lose_is_left_to_the_scanner() {
+    fn what_vtkio_would_lose_is_not_taken_from_it() {
         let file = |value: &str| {
             let head = "# vtk DataFile Version 3.0\none cell\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n";
             let cells = "0 0 0 1 0 0 0 1 0 0 0 1\nCELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n";

@@ -11,8 +11,35 @@ pub(super) type Fault = String;
 pub(super) struct Scanner<'a> {
     bytes: &'a [u8],
     at: usize,
+    /// The byte that lines end with: the last of two, or that of old Macs.
+    end: u8,
     pub(super) binary: bool,
 }
+
+/// The keywords that sections start with, and what follows them on the line: words, counts (`n`) and types (`t`).
+const SECTIONS: [(&str, &str); 18] = [
+    ("POINTS", "nt"),
+    ("CELLS", "nn"),
+    ("CELL_TYPES", "n"),
+    ("POINT_DATA", "n"),
+    ("CELL_DATA", "n"),
+    ("FIELD", "wn"),
+    ("SCALARS", "wt"),
+    ("COLOR_SCALARS", "wn"),
+    ("LOOKUP_TABLE", "wn"),
+    ("VECTORS", "wt"),
+    ("NORMALS", "wt"),
+    ("TANGENTS", "wt"),
+    ("TENSORS", "wt"),
+    ("TENSORS6", "wt"),
+    ("TEXTURE_COORDINATES", "wnt"),
+    ("GLOBAL_IDS", "wt"),
+    ("PEDIGREE_IDS", "wt"),
+    ("EDGE_FLAGS", "wt"),
+];
+
+/// Bytes of a line that could start a section.
+const LONGEST_LINE: usize = 1 << 10;
 
 /// What an array is made of.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,7 +81,12 @@ impl Type {
 
 impl<'a> Scanner<'a> {
     pub(super) fn new(bytes: &'a [u8]) -> Self {
-        Scanner { bytes, at: 0, binary: false }
+        // What comes before the first line's text is passed over, as is done where the kind of file is told.
+        let bom = usize::from(bytes.starts_with(b"\xef\xbb\xbf")) * 3;
+        let at = bom + bytes[bom..].iter().take_while(|b| b.is_ascii_whitespace()).count();
+        let mut first = bytes[at..].iter().skip_while(|b| !matches!(b, b'\n' | b'\r'));
+        let old_mac = first.next() == Some(&b'\r') && first.next() != Some(&b'\n');
+        Scanner { bytes, at, end: if old_mac { b'\r' } else { b'\n' }, binary: false }
     }
 
     /// Bytes from the start of the file.
@@ -111,7 +143,7 @@ impl<'a> Scanner<'a> {
 
     /// What is left of the line. The scanner goes to the start of the next one.
     pub(super) fn line(&mut self) -> String {
-        let end = self.rest().iter().position(|b| *b == b'\n');
+        let end = self.rest().iter().position(|b| *b == self.end);
         let line = &self.rest()[..end.unwrap_or(self.rest().len())];
         self.at += end.map_or(line.len(), |end| end + 1);
         String::from_utf8_lossy(line).trim().to_owned()
@@ -125,8 +157,111 @@ impl<'a> Scanner<'a> {
     /// Passes a description of the array before, if there is one: it ends with an empty line.
     pub(super) fn pass_metadata(&mut self) {
         while self.pass("METADATA") {
-            self.line();
-            while !self.line().is_empty() {}
+            self.pass_description();
+        }
+    }
+
+    /// Passes the rest of a description.
+    pub(super) fn pass_description(&mut self) {
+        self.line();
+        while !self.line().is_empty() {}
+    }
+
+    /// The place of the next word.
+    pub(super) fn at_word(&mut self) -> usize {
+        self.skip_blanks();
+        self.at
+    }
+
+    /// Whether a number is next.
+    pub(super) fn is_at_number(&mut self) -> bool {
+        self.skip_blanks();
+        let word = self.rest().split(u8::is_ascii_whitespace).next().unwrap_or_default();
+        std::str::from_utf8(word).is_ok_and(|word| f64::parse(word).is_some())
+    }
+
+    /// Whether the next line starts a section.
+    pub(super) fn is_at_section(&mut self) -> bool {
+        self.skip_blanks();
+        self.is_section(self.at)
+    }
+
+    /// Whether the next line is that before the numbers of an array of a field.
+    pub(super) fn is_at_field(&mut self) -> bool {
+        self.skip_blanks();
+        self.is_field(self.at)
+    }
+
+    /// The words of the line at `at`, as far as they are text.
+    fn words(&self, at: usize) -> impl Iterator<Item = &'a str> + use<'a> {
+        let rest = &self.bytes[at..];
+        let line = &rest[..rest.len().min(LONGEST_LINE)];
+        let line = line.split(|b| matches!(b, b'\n' | b'\r')).next().unwrap_or_default();
+        line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).map_while(|w| std::str::from_utf8(w).ok())
+    }
+
+    fn is_section(&self, at: usize) -> bool {
+        let mut words = self.words(at);
+        let Some(keyword) = words.next().map(str::to_ascii_uppercase) else { return false };
+        if keyword == "METADATA" {
+            return true;
+        }
+        let Some((_, shape)) = SECTIONS.iter().find(|(known, _)| *known == keyword) else { return false };
+        shape.chars().all(|what| {
+            words.next().is_some_and(|word| match what {
+                'n' => word.parse::<u64>().is_ok(),
+                't' => Type::from_name(word, self.binary).is_ok(),
+                _ => true,
+            })
+        })
+    }
+
+    /// Whether the line at `at` is that before the numbers of an array of a field.
+    fn is_field(&self, at: usize) -> bool {
+        let mut words = self.words(at);
+        let mut next = |fits: &dyn Fn(&str) -> bool| words.next().is_some_and(fits);
+        let count = |word: &str| word.parse::<u64>().is_ok();
+        let described = next(&|_| true) && next(&count) && next(&count);
+        described && next(&|word| Type::from_name(word, self.binary).is_ok())
+    }
+
+    /// Goes to the first line after byte `start` that starts a section, or, in a field, an array; else to the end.
+    pub(super) fn go_on(&mut self, start: usize, in_field: bool) {
+        self.at = self.next_start(start, in_field).unwrap_or(self.bytes.len());
+    }
+
+    fn next_start(&self, start: usize, in_field: bool) -> Option<usize> {
+        let mut at = start;
+        while let Some(end) = self.bytes[at..].iter().position(|b| matches!(b, b'\n' | b'\r')) {
+            at += end + 1;
+            // No keyword starts with anything but a letter, which spares most lines of numbers.
+            let letter = self.bytes.get(at).is_some_and(u8::is_ascii_alphabetic);
+            if letter && self.is_section(at) || in_field && self.is_field(at) {
+                return Some(at);
+            }
+        }
+        None
+    }
+
+    /// Checks that an array, whose lines start at byte `start`, ends where something else starts: that it is as long as
+    /// it says.
+    pub(super) fn check_end(&mut self, start: usize, in_field: bool) -> Result<(), Fault> {
+        let end = self.at;
+        if self.is_at_end() || self.is_at_section() || in_field && self.is_field(self.at) {
+            return Ok(());
+        }
+        if !self.binary {
+            let over = self.is_at_number();
+            return if over { Err("it holds more numbers than it should".to_owned()) } else { Ok(()) };
+        }
+        // Bytes that are no text belong to it; text that starts a section in the midst of it does not.
+        let next = self.next_start(start, in_field);
+        let word = self.rest().split(u8::is_ascii_whitespace).next().unwrap_or_default();
+        let is_word = word.len() > 2 && word.iter().all(|b| b.is_ascii_alphanumeric() || *b == b'_');
+        match next {
+            Some(next) if next < end => Err("it holds fewer bytes than it should".to_owned()),
+            _ if is_word && word[0].is_ascii_alphabetic() || self.rest().iter().all(|b| *b == 0) => Ok(()),
+            _ => Err("it holds more bytes than it should".to_owned()),
         }
     }
 
@@ -219,8 +354,11 @@ impl<'a> Scanner<'a> {
             let token = self.bytes_of_word();
             let token = token.ok_or_else(|| format!("it holds {} numbers, not {count}", numbers.len()))?;
             let number = std::str::from_utf8(token).ok().and_then(T::parse).ok_or_else(|| {
-                let token = String::from_utf8_lossy(&token[..token.len().min(40)]);
-                format!("\"{}\" is not a number of its type", token.escape_debug())
+                let found = String::from_utf8_lossy(&token[..token.len().min(40)]);
+                if self.is_section(self.at - token.len()) {
+                    return format!("it holds {} numbers, not {count}: {found} follows", numbers.len());
+                }
+                format!("\"{}\" is not a number of its type", found.escape_debug())
             });
             numbers.push(number?);
         }

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::io::data::{DataArray, Store};
 use crate::io::number::{Number, with_kind};
 use crate::io::{Progress, validated};
-use crate::mesh::{Array, Mesh};
+use crate::mesh::{Array, LeftOut, Mesh};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::{BTreeSet, HashMap};
@@ -15,14 +15,17 @@ use std::path::Path;
 /// A grid whose head has been read.
 pub(super) struct Grid<'a> {
     pub(super) path: &'a Path,
-    pub(super) stores: Vec<Store>,
+    pub(super) stores: Vec<&'a Store>,
     pub(super) pieces: Vec<Piece>,
     pub(super) progress: Progress<'a>,
 }
 
+/// The arrays of points or cells, and those that had to be left out.
+type Data = (Vec<Array>, Vec<LeftOut>);
+
 impl Grid<'_> {
-    /// Reads the arrays, and makes one mesh of all pieces.
-    pub(super) fn mesh(&self) -> Result<Mesh> {
+    /// Reads the arrays, and makes one mesh of all pieces. Also says which arrays of points and of cells it left out.
+    pub(super) fn mesh(&self) -> Result<(Mesh, [Vec<LeftOut>; 2])> {
         let points = self.pieces.iter().fold(0u64, |sum, piece| sum.saturating_add(piece.points));
         if points >= u64::from(u32::MAX) {
             let what = format!("{points} points are more than Halite can index (2^32 - 2)");
@@ -32,20 +35,21 @@ impl Grid<'_> {
         let (topology, (points, (point_arrays, cell_arrays))) =
             rayon::join(|| self.topology(), || rayon::join(|| self.points(), data));
         let (points, Topology { cells, polyhedra }) = (points?, topology?);
-        let mesh = Mesh::new(points, cells, point_arrays?, cell_arrays?);
+        let ((point_arrays, of_points), (cell_arrays, of_cells)) = (point_arrays?, cell_arrays?);
+        let mesh = Mesh::new(points, cells, point_arrays, cell_arrays);
         let mesh = mesh.and_then(|mesh| match polyhedra {
             Some(polyhedra) => mesh.with_polyhedra(polyhedra),
             None => Ok(mesh),
         });
-        validated(self.path, mesh)
+        Ok((validated(self.path, mesh)?, [of_points, of_cells]))
     }
 
     pub(super) fn store(&self, piece: &Piece) -> &Store {
-        &self.stores[piece.store]
+        self.stores[piece.store]
     }
 
     pub(super) fn malformed(&self, piece: &Piece, what: impl Into<String>) -> Error {
-        Error::malformed(&self.store(piece).path, what)
+        Error::malformed(&self.store(piece).input.path, what)
     }
 
     fn points(&self) -> Result<Vec<DVec3>> {
@@ -116,8 +120,9 @@ impl Grid<'_> {
         Ok((0..count as usize).map(|i| bytes[i / 8] >> (7 - i % 8) & 1).collect::<Vec<u8>>())
     }
 
-    /// The arrays of point or cell data that all pieces have, pieces with no points (or cells) aside.
-    fn data(&self, section: Section) -> Result<Vec<Array>> {
+    /// The arrays of point or cell data that all pieces have, pieces with no points (or cells) aside, as far as they are
+    /// whole.
+    fn data(&self, section: Section) -> Result<Data> {
         let filled: Vec<&Piece> = self.pieces.iter().filter(|piece| piece.tuples(section) > 0).collect();
         let filled = if filled.is_empty() { self.pieces.iter().take(1).collect() } else { filled };
         let found: Vec<HashMap<Key<'_>, &DataArray>> =
@@ -134,15 +139,27 @@ impl Grid<'_> {
                 kept.push(parts);
             }
         }
-        if !lost.is_empty() {
-            let names: Vec<&str> = lost.iter().map(|key| key.0).collect();
-            tracing::warn!(
-                "{}: {} arrays {names:?} are left out: not every piece has them, with as many components",
-                self.path.display(),
-                section.name()
-            );
+        let lost = lost.iter().map(|key| {
+            let (of, name) = (section.name(), key.0.to_owned());
+            let why =
+                format!("not every piece has the {of} array \"{}\", with as many components", name.escape_debug());
+            LeftOut { name, why }
+        });
+        let mut left_out: Vec<LeftOut> = lost.collect();
+        let read = |parts: &Vec<(&Piece, &DataArray)>| self.data_array(section, parts);
+        let mut arrays = Vec::new();
+        for (read, parts) in kept.par_iter().map(read).collect::<Vec<_>>().into_iter().zip(&kept) {
+            match read {
+                Ok(array) => arrays.push(array),
+                // Without it the grid is still whole.
+                Err(Error::Malformed { what, .. } | Error::Unsupported { what, .. }) => {
+                    let name = parts.first().map(|(_, array)| array.name.clone()).unwrap_or_default();
+                    left_out.push(LeftOut { name, why: what });
+                }
+                Err(error) => return Err(error),
+            }
         }
-        kept.par_iter().map(|parts| self.data_array(section, parts)).collect()
+        Ok((arrays, left_out))
     }
 
     /// One array of its parts in the pieces.

@@ -2,14 +2,14 @@
 
 use crate::error::{Error, Result};
 use crate::io::data::{Appended, Data, DataArray, Store};
+use crate::io::input::{Input, Opened};
 use crate::io::number::Kind;
 use crate::io::refuse;
+use crate::mesh::{Attributes, LeftOut, Role};
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
-use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek};
 use std::ops::Range;
-use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicU64;
 
 /// The elements of a piece that hold data arrays.
@@ -35,10 +35,19 @@ impl Section {
             Section::Cells => "Cells",
         }
     }
+
+    /// Whether its arrays are data of points (0) or cells (1), without which the grid is still whole.
+    fn of_data(self) -> Option<usize> {
+        match self {
+            Section::PointData => Some(0),
+            Section::CellData => Some(1),
+            _ => None,
+        }
+    }
 }
 
 /// A piece of the grid as the head describes it.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Piece {
     /// Which file it is in.
     pub(super) store: usize,
@@ -58,6 +67,25 @@ impl Piece {
 
     pub(super) fn arrays(&self, section: Section) -> &[DataArray] {
         &self.arrays[section as usize]
+    }
+
+    /// The piece at a time step: of the arrays that are given for some steps only those that are for this one, or the
+    /// last ones before it.
+    pub(super) fn at_step(&self, step: usize) -> Piece {
+        let mut piece = self.clone();
+        for (kept, all) in piece.arrays.iter_mut().zip(&self.arrays) {
+            kept.retain(|array| {
+                let last = |of: &DataArray| of.steps.iter().copied().filter(|s| *s <= step).max();
+                let others = all.iter().filter(|other| other.name == array.name && !other.steps.is_empty());
+                array.steps.is_empty() || (last(array).is_some() && last(array) == others.filter_map(last).max())
+            });
+        }
+        piece
+    }
+
+    /// The steps that its arrays name.
+    pub(super) fn steps(&self) -> impl Iterator<Item = usize> + '_ {
+        self.arrays.iter().flatten().flat_map(|array| array.steps.iter().copied())
     }
 
     /// The tuples that each array of point or cell data must have.
@@ -86,7 +114,17 @@ enum Element {
     Array(Section),
     /// The grid of a file that lists others.
     List,
+    /// The list of a `.pvd` file.
+    Collection,
     Other,
+}
+
+/// A file of a collection.
+#[derive(Debug)]
+pub(super) struct Entry {
+    /// None if it does not say.
+    pub(super) time: Option<f64>,
+    pub(super) file: String,
 }
 
 /// The state of reading the head of a file.
@@ -96,18 +134,25 @@ pub(super) struct Head {
     open: Vec<Element>,
     /// Whether it lists files, and which.
     pub(super) is_list: bool,
-    pub(super) sources: Vec<PathBuf>,
+    pub(super) sources: Vec<String>,
+    /// The files of a collection, if it is one.
+    pub(super) collection: Option<Vec<Entry>>,
+    /// The times of its steps, if it says them.
+    pub(super) times: Vec<f64>,
+    /// What it says of the arrays of points, and of cells.
+    pub(super) attributes: [Attributes; 2],
     /// Lagrange hexahedra are numbered as before VTK 9.
     old_numbering: bool,
 }
 
 impl Head {
     /// Reads the XML up to the appended data, and skips the text of all elements.
-    pub(super) fn read(path: &Path) -> Result<Self> {
-        let file = File::open(path).map_err(|e| Error::file(path, e))?;
-        let length = file.metadata().map_err(|e| Error::file(path, e))?.len();
+    pub(super) fn read(input: &Input) -> Result<Self> {
+        let path = &input.path;
+        let file = input.open().map_err(|e| Error::file(path, e))?;
+        let length = file.length().map_err(|e| Error::file(path, e))?;
         let store = Store {
-            path: path.to_owned(),
+            input: input.clone(),
             length,
             big_endian: false,
             word: 4,
@@ -121,6 +166,9 @@ impl Head {
             open: Vec::new(),
             is_list: false,
             sources: Vec::new(),
+            collection: None,
+            times: Vec::new(),
+            attributes: Default::default(),
             old_numbering: false,
         };
         let inner = BufReader::with_capacity((length as usize).clamp(1 << 10, 1 << 18), file);
@@ -150,6 +198,10 @@ impl Head {
                 }
                 Event::End(_) => {
                     head.open.pop();
+                    // Whatever follows is no part of the file.
+                    if head.open.is_empty() {
+                        break;
+                    }
                 }
                 Event::Eof if head.open.is_empty() => break,
                 Event::Eof => return Err(head.malformed("the file ends before its XML does: it was cut short")),
@@ -160,14 +212,14 @@ impl Head {
                 head.add_text(*section, text);
             }
         }
-        if head.pieces.is_empty() && head.sources.is_empty() {
+        if head.pieces.is_empty() && head.sources.is_empty() && head.collection.is_none() {
             return Err(head.malformed("there is no <Piece> in it"));
         }
         Ok(head)
     }
 
     fn malformed(&self, what: impl Into<String>) -> Error {
-        Error::malformed(&self.store.path, what)
+        Error::malformed(&self.store.input.path, what)
     }
 
     /// Takes in what a tag says.
@@ -180,12 +232,29 @@ impl Head {
                 let other = other.escape_debug();
                 return Err(self.malformed(format!("this is no VTK file: its first element is <{other}>")));
             }
-            (Some(Element::File), "UnstructuredGrid") if !self.is_list => Element::Grid,
+            (Some(Element::File), "UnstructuredGrid") if !self.is_list && self.collection.is_none() => {
+                let times = self.attribute(tag, "TimeValues")?.unwrap_or_default();
+                self.times = times.split_ascii_whitespace().map(|t| self.time(t)).collect::<Result<_>>()?;
+                Element::Grid
+            }
+            (Some(Element::File), "Collection") if self.collection.is_some() => Element::Collection,
+            (Some(Element::Collection), "DataSet") => {
+                let time = self.attribute(tag, "timestep")?.filter(|time| !time.trim().is_empty());
+                let time = time.map(|time| self.time(time.trim())).transpose()?;
+                let file = self.attribute(tag, "file")?;
+                let file = file.ok_or_else(|| self.malformed("a <DataSet> has no file"))?;
+                self.collection.get_or_insert_default().push(Entry { time, file });
+                Element::Other
+            }
+            (Some(Element::List), "PPointData" | "PCellData") => {
+                self.add_roles(usize::from(name.as_ref() == "PCellData"), tag)?;
+                Element::Other
+            }
             (Some(Element::File), "PUnstructuredGrid") if self.is_list => Element::List,
             (Some(Element::List), "Piece") => {
                 let source = self.attribute(tag, "Source")?;
                 let source = source.ok_or_else(|| self.malformed("a <Piece> has no Source"))?;
-                self.sources.push(source.into());
+                self.sources.push(source);
                 Element::Other
             }
             (Some(Element::Grid), "Piece") => {
@@ -198,9 +267,13 @@ impl Head {
                 self.pieces.push(piece);
                 Element::Piece
             }
-            (Some(Element::Piece), name) if Section::from_name(name).is_some() => {
-                Section::from_name(name).map_or(Element::Other, Element::Section)
-            }
+            (Some(Element::Piece), name) => match Section::from_name(name) {
+                Some(section) => {
+                    section.of_data().map_or(Ok(()), |of| self.add_roles(of, tag))?;
+                    Element::Section(section)
+                }
+                None => Element::Other,
+            },
             (Some(Element::Section(section)), "DataArray") => self.array(section, tag)?,
             _ => Element::Other,
         })
@@ -209,8 +282,9 @@ impl Head {
     fn root(&mut self, tag: &BytesStart<'_>) -> Result<Element> {
         let kind = self.attribute(tag, "type")?.unwrap_or_default();
         self.is_list = kind == "PUnstructuredGrid";
-        if kind != "UnstructuredGrid" && !self.is_list {
-            return Err(refuse(&self.store.path, &kind));
+        self.collection = (kind == "Collection").then(Vec::new);
+        if kind != "UnstructuredGrid" && !self.is_list && self.collection.is_none() {
+            return Err(refuse(&self.store.input.path, &kind));
         }
         let version = self.attribute(tag, "version")?.unwrap_or_default();
         let (major, minor) = version.split_once('.').unwrap_or((&version, "0"));
@@ -231,19 +305,32 @@ impl Head {
         Ok(Element::File)
     }
 
-    /// Notes a data array.
+    /// Notes a data array. One of point or cell data that is not described as it must be is left out.
     fn array(&mut self, section: Section, tag: &BytesStart<'_>) -> Result<Element> {
         let name = self.attribute(tag, "Name")?.unwrap_or_default();
+        match (self.described(section, &name, tag), section.of_data()) {
+            (Ok(Some(array)), _) => {
+                if let Some(piece) = self.pieces.last_mut() {
+                    piece.arrays[section as usize].push(array);
+                }
+                Ok(Element::Array(section))
+            }
+            (Ok(None), _) => Ok(Element::Other),
+            (Err(Error::Malformed { what, .. }), Some(of)) => {
+                self.attributes[of].left_out.push(LeftOut { name, why: what });
+                Ok(Element::Other)
+            }
+            (Err(error), _) => Err(error),
+        }
+    }
+
+    /// A data array as its tag describes it; none if it is of no use.
+    fn described(&self, section: Section, name: &str, tag: &BytesStart<'_>) -> Result<Option<DataArray>> {
         let fail =
             |what: String| self.malformed(format!("{} array \"{}\": {what}", section.name(), name.escape_debug()));
         let kind = self.attribute(tag, "type")?.unwrap_or_default();
-        if kind == "String" {
-            tracing::warn!(
-                "{}: {} array \"{name}\" is left out: its type is {kind}",
-                self.store.path.display(),
-                section.name()
-            );
-            return Ok(Element::Other);
+        if kind == "String" && section.of_data().is_none() {
+            return Ok(None);
         }
         let bits = kind == "Bit";
         let kind = Kind::from_name(if bits { "UInt8" } else { &kind })
@@ -255,7 +342,12 @@ impl Head {
             }
             None if section == Section::Points => 3,
             None => 1,
-        };
+        } as usize;
+        let steps = self.attribute(tag, "TimeStep")?.unwrap_or_default();
+        let steps = steps.split_ascii_whitespace().map(|step| {
+            step.parse().map_err(|_| fail(format!("its TimeStep \"{}\" is not a count", step.escape_debug())))
+        });
+        let steps = steps.collect::<Result<Vec<usize>>>()?;
         let offset = self.attribute(tag, "offset")?;
         let data = match self.attribute(tag, "format")?.as_deref() {
             Some("appended") | None if offset.is_some() => {
@@ -268,14 +360,25 @@ impl Head {
             Some("binary") => Data::Base64(Vec::new()),
             Some(other) => return Err(fail(format!("its format is \"{}\"", other.escape_debug()))),
         };
-        if let Some(piece) = self.pieces.len().checked_sub(1) {
-            // In text each has a number of its own.
-            let bits = bits && !matches!(data, Data::Ascii(_));
-            let components = components as usize;
-            let array = DataArray { section: section.name(), piece, name, kind, bits, components, data };
-            self.pieces[piece].arrays[section as usize].push(array);
+        // In text each has a number of its own.
+        let bits = bits && !matches!(data, Data::Ascii(_));
+        let (piece, name) = (self.pieces.len().saturating_sub(1), name.to_owned());
+        Ok(Some(DataArray { section: section.name(), piece, name, kind, bits, components, steps, data }))
+    }
+
+    /// Notes which arrays of points (0) or cells (1) are for what.
+    fn add_roles(&mut self, of: usize, tag: &BytesStart<'_>) -> Result<()> {
+        for (role, attribute) in Role::ALL {
+            if let Some(name) = self.attribute(tag, attribute)? {
+                self.attributes[of].add_role(role, &name);
+            }
         }
-        Ok(Element::Array(section))
+        Ok(())
+    }
+
+    fn time(&self, text: &str) -> Result<f64> {
+        let time = text.parse().ok().filter(|time: &f64| time.is_finite());
+        time.ok_or_else(|| self.malformed(format!("the time \"{}\" is not a number", text.escape_debug())))
     }
 
     /// Notes where text of the newest array is.
@@ -305,11 +408,11 @@ impl Head {
 
 /// Bytes that a tag or comment may have. It is kept in memory as a whole: without its end, that would be the rest of
 /// the file.
-const MOST_OF_A_TAG: usize = 1 << 16;
+const MOST_OF_A_TAG: usize = 1 << 20;
 
 /// A file of which so many bytes may be taken.
 struct Limited {
-    inner: BufReader<File>,
+    inner: BufReader<Opened>,
     left: usize,
 }
 
