@@ -234,9 +234,8 @@ fn outer_eigenvalues(m: DMat3) -> [f64; 2] {
         for row in &mut a {
             (row[p], row[q]) = turned(row[p], row[q]);
         }
-        for k in 0..3 {
-            (a[p][k], a[q][k]) = turned(a[p][k], a[q][k]);
-        }
+        let turned: [(f64, f64); 3] = std::array::from_fn(|k| turned(a[p][k], a[q][k]));
+        (a[p], a[q]) = (turned.map(|t| t.0), turned.map(|t| t.1));
     }
     let values = [a[0][0], a[1][1], a[2][2]];
     [values.into_iter().fold(f64::MAX, f64::min), values.into_iter().fold(f64::MIN, f64::max)]

@@ -416,7 +416,9 @@ impl Renderer {
             return Ok(());
         };
         let tables = self.integral.form != Form::Exact;
-        if self.pool.install(|| field.fit(mesh, transfer, tables))? {
+        let changed = self.pool.install(|| field.fit(mesh, transfer, tables))?;
+        field.warn(transfer);
+        if changed {
             self.forget(Part::Field);
         }
         Ok(())

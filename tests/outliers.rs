@@ -15,14 +15,15 @@ use common::draw::{self, LOOKS, Look, Random, SIZE, Shape};
 use common::{ENGINES, Engine, Report, Scene, set};
 use glam::{DMat3, DVec3, dvec3};
 use halite::field::{Association, Component, Field};
+use halite::host::Log;
 use halite::image::Image;
 use halite::integral::choice::{Choice, Form};
 use halite::mesh::cells::Tetrahedra;
 use halite::mesh::{Array, Mesh, Values, generate};
 use halite::render::{self, Renderer};
+use halite::scene;
 use halite::transfer::{Convention, Emission, TransferFunction};
 use halite::view::{Blend, Projection, View};
-use halite::{host, scene};
 use std::path::Path;
 
 const TWIN: Engine = Engine::Twin { threads: 2 };
@@ -235,7 +236,7 @@ fn an_edit_hands_values_over_only_if_it_must() {
 /// Two narrow peaks far apart are more than one map can tell.
 #[test]
 fn knots_that_are_too_close_are_named() {
-    host::keep_log();
+    let log = Log::default();
     let mesh = generate::tetrahedra(2);
     let values = mesh.points().iter().map(|p| p.x * 1.5).collect();
     let peak = |s: f64| [(s - 1e-9, 0.0), (s, 1e6), (s + 1e-9, 0.0)];
@@ -246,8 +247,8 @@ fn knots_that_are_too_close_are_named() {
         Association::Point,
         TransferFunction::new(vec![(0.0, [1.0; 3])], opacity, 0.3).unwrap(),
     );
-    TWIN.image(&scene, &view(Blend::Composite));
-    let log = host::take_log().join("\n");
+    log.collect(|| TWIN.image(&scene, &view(Blend::Composite)));
+    let log = log.take().join("\n");
     let named = |a: f64, b: f64| log.contains(&format!("{a} and {b}"));
     assert!(log.contains("WARN") && (named(-0.750000001, -0.75) || named(0.624999999, 0.625)), "{log}");
 }

@@ -194,12 +194,11 @@ impl Chooser {
                 self.normal[k] = best;
             }
         }
-        self.warn(transfer);
         changed
     }
 
     /// Says, once for the same two, which knots of the opacity function are closer than values can be told apart.
-    fn warn(&mut self, transfer: &TransferFunction) {
+    pub(crate) fn warn(&mut self, transfer: &TransferFunction) {
         let last = self.kind.components() - 1;
         let close = too_close(transfer.opacity(), self.normal[last], self.range[last]);
         if let Some([a, b]) = close.filter(|_| self.close != close) {

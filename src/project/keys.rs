@@ -116,7 +116,7 @@ fn ranked(cells: Vec<Option<(f64, u32)>>) -> Vec<u32> {
     let mut keys = vec![HIDDEN; cells.len()];
     for (rank, (_, i)) in (0..).zip(seen) {
         let count = cells[i as usize].map_or(1, |c| c.1);
-        keys[i as usize] = rank * MOST_PARTS | (count - 1);
+        keys[i as usize] = (rank * MOST_PARTS) | (count - 1);
     }
     keys
 }

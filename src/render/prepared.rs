@@ -48,6 +48,11 @@ impl Prepared {
         Ok(changed)
     }
 
+    /// Says which knots of `transfer` are too close, once for the same.
+    pub(super) fn warn(&mut self, transfer: &TransferFunction) {
+        self.chooser.warn(transfer);
+    }
+
     /// Brings the values into the order of `mesh`.
     ///
     /// # Errors

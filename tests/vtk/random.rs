@@ -73,7 +73,7 @@ impl Writer<'_> {
             "int" => values!(I32 i32, -70_000),
             "unsigned_int" => Values::U32(numbers.iter().map(|n| u32::from(*n) * 40_000_000).collect()),
             "vtktypeint64" => values!(I64 i64, -7_000_000_000),
-            "vtktypeuint64" => Values::U64(numbers.iter().map(|n| u64::from(*n) << 50).collect()),
+            "vtktypeuint64" => Values::U64(numbers.iter().map(|n| u64::from(*n) << 44).collect()),
             "float" => values!(F32 f32, -0.125),
             "double" => values!(F64 f64, 0.0625),
             "bit" => Values::U8(numbers.iter().map(|n| n % 2).collect()),
@@ -297,9 +297,14 @@ fn random_legacy_files() {
                 let geometry = points == super::floats(&coordinates)
                     && mesh.cells().types == types
                     && mesh.cells().connectivity == connectivity;
-                let arrays = arrays == [mesh.point_arrays(), mesh.cell_arrays()];
-                if !geometry || !arrays {
-                    wrong.push(format!("{i}.vtk is not read as it was written: geometry {geometry}, arrays {arrays}"));
+                let found = [mesh.point_arrays(), mesh.cell_arrays()];
+                if !geometry || arrays != found {
+                    let own = found.iter().flat_map(|own| own.iter()).collect::<Vec<_>>();
+                    let lost = arrays.iter().flatten().filter(|array| !own.contains(array)).collect::<Vec<_>>();
+                    let known = [mesh.point_attributes(), mesh.cell_attributes()];
+                    let why = known.map(|known| format!("{:?}", known.left_out)).concat();
+                    let what = format!("{i}.vtk is not read as it was written: geometry {geometry}, {lost:?}, {why}");
+                    wrong.push(what.chars().take(600).collect());
                 }
             }
         }
