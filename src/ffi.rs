@@ -7,18 +7,21 @@
 #![allow(clippy::needless_pass_by_value, reason = "the bridge hands structs over by value")]
 #![allow(unreachable_pub, unused_qualifications, reason = "cxx makes names of its own public, and says where they are")]
 
+mod numbers;
+
 use crate::error::{Error, Result};
 use crate::field::{Association, Component, Field};
-use crate::host::{Session, guard, keep_log, named, take_log};
+use crate::host::{Log, Session, carried, guard, named};
 use crate::image::{Backdrop, Image};
 use crate::integral::Choice;
+use crate::integral::choice::Form;
 use crate::mesh::cells::name;
-use crate::mesh::{Array, Cells, Mesh, Polyhedra, Values, with_values};
+use crate::mesh::{Array, Cells, Mesh, Polyhedra, Values};
 use crate::transfer::{Convention, TransferFunction};
 use crate::view::{Blend, Camera, ClippingPlane, DepthBuffer, DepthKind, Projection, View};
 use bridge::{ArrayInfo, CameraSpec, CellCount, FieldSpec, IntegralSpec, Numbers, Stats, TransferSpec, Type, ViewSpec};
 use glam::{DMat4, DVec3};
-use rayon::prelude::*;
+use numbers::{cast, indices, point_ids, triples, values};
 use std::path::Path;
 
 #[cxx::bridge(namespace = "halite::bridge")]
@@ -139,13 +142,14 @@ mod bridge {
     }
 
     extern "Rust" {
+        type Log;
         type Mesh;
         type Session;
 
-        fn keep_log_lines() -> Result<()>;
-        fn take_log_lines() -> Result<Vec<String>>;
+        fn new_log() -> Result<Box<Log>>;
+        fn take_lines(log: &Log) -> Result<Vec<String>>;
 
-        fn open_mesh(path: &str, threads: usize) -> Result<Box<Mesh>>;
+        fn open_mesh(path: &str, threads: usize, log: &Log) -> Result<Box<Mesh>>;
         fn new_mesh(points: Numbers, types: &[u8], offsets: Numbers, connectivity: Numbers) -> Result<Box<Mesh>>;
         fn add_polyhedra(mesh: &mut Mesh, cells: Numbers, faces: Numbers, points: Numbers) -> Result<()>;
         fn add_array(mesh: &mut Mesh, name: &str, of_cells: bool, components: usize, numbers: Numbers) -> Result<()>;
@@ -157,7 +161,7 @@ mod bridge {
         fn offsets(mesh: &Mesh) -> Result<Vec<u64>>;
         fn connectivity(mesh: &Mesh) -> Result<Vec<u32>>;
 
-        fn new_session(threads: usize, device: &str, engine: &str) -> Result<Box<Session>>;
+        fn new_session(threads: usize, device: &str, engine: &str, log: &Log) -> Result<Box<Session>>;
         fn set_integral(session: &mut Session, spec: IntegralSpec) -> Result<()>;
         fn set_mesh(session: &mut Session, mesh: &Mesh, matrix: [f64; 16]) -> Result<()>;
         fn move_points(session: &mut Session, points: Numbers, matrix: [f64; 16]) -> Result<bool>;
@@ -173,22 +177,20 @@ mod bridge {
 }
 use bridge::Progress;
 
-fn keep_log_lines() -> Result<()> {
-    guard(|| {
-        keep_log();
-        Ok(())
-    })
+fn new_log() -> Result<Box<Log>> {
+    guard(|| Ok(Box::default()))
 }
 
-fn take_log_lines() -> Result<Vec<String>> {
-    guard(|| Ok(take_log()))
+fn take_lines(log: &Log) -> Result<Vec<String>> {
+    guard(|| Ok(log.take()))
 }
 
-fn open_mesh(path: &str, threads: usize) -> Result<Box<Mesh>> {
+fn open_mesh(path: &str, threads: usize, log: &Log) -> Result<Box<Mesh>> {
     guard(|| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let pool = pool.map_err(|e| Error::Render(format!("cannot start {threads} threads: {e}")))?;
-        pool.install(|| crate::io::open(Path::new(path), &|_| ())).map(Box::new)
+        let open = || crate::io::open(Path::new(path), &|_| ());
+        log.collect(|| pool.install(carried(open))).map(Box::new)
     })
 }
 
@@ -208,26 +210,6 @@ fn add_polyhedra(mesh: &mut Mesh, cells: Numbers, faces: Numbers, points: Number
             points: point_ids(points)?,
         })
     })
-}
-
-/// Integers from 0 on.
-fn indices(what: &str, numbers: Numbers) -> Result<Vec<u64>> {
-    let negative = || Error::Mesh(format!("{what} are negative, or no integers"));
-    match numbers.kind {
-        Type::I32 => cast::<i32>(&numbers)?.par_iter().map(|&i| u64::try_from(i).map_err(|_| negative())).collect(),
-        Type::I64 => cast::<i64>(&numbers)?.par_iter().map(|&i| u64::try_from(i).map_err(|_| negative())).collect(),
-        Type::U32 => Ok(cast::<u32>(&numbers)?.iter().map(|&i| u64::from(i)).collect()),
-        Type::U64 => Ok(cast::<u64>(&numbers)?.to_vec()),
-        _ => Err(negative()),
-    }
-}
-
-fn point_ids(numbers: Numbers) -> Result<Vec<u32>> {
-    let narrow = |i: u64| u32::try_from(i).map_err(|_| Error::Mesh(format!("a cell names point {i}")));
-    match numbers.kind {
-        Type::U32 => Ok(cast::<u32>(&numbers)?.to_vec()),
-        _ => indices("point indices", numbers)?.into_par_iter().map(narrow).collect(),
-    }
 }
 
 fn add_array(mesh: &mut Mesh, name: &str, of_cells: bool, components: usize, numbers: Numbers) -> Result<()> {
@@ -301,37 +283,49 @@ fn connectivity(mesh: &Mesh) -> Result<Vec<u32>> {
     guard(|| Ok(mesh.cells().connectivity.clone()))
 }
 
-fn new_session(threads: usize, device: &str, engine: &str) -> Result<Box<Session>> {
-    guard(|| Session::new(threads, device, engine).map(Box::new))
+fn new_session(threads: usize, device: &str, engine: &str, log: &Log) -> Result<Box<Session>> {
+    guard(|| Session::new(threads, device, engine, log.clone()).map(Box::new))
 }
 
 fn set_integral(session: &mut Session, spec: IntegralSpec) -> Result<()> {
     session.guarded(|s| s.set_integral(choice(&spec)?))
 }
 
+/// What the form reads of a specification, and nothing else of it.
 fn choice(spec: &IntegralSpec) -> Result<Choice> {
-    let table = match spec.table {
-        [0, 0, 0] => None,
-        [front, back, depth] => match [front, back, depth].map(u32::try_from) {
-            [Ok(front), Ok(back), Ok(depth)] => Some([front, back, depth]),
-            _ => {
-                let size = format!("{front} x {back} x {depth}");
-                return Err(Error::Render(format!("a table of {size} texels cannot be; 0 x 0 x 0 is the default")));
-            }
-        },
-    };
-    let degree = spec.degree;
-    let negative = |_| Error::Render(format!("polynomials have a degree from 1 to 8, and not {degree}"));
-    Ok(Choice {
-        form: named("integral", spec.form)?,
-        table,
-        lengths: named("kind of a table's lengths", spec.lengths)?,
-        texels: named("kind of a table's texels", spec.texels)?,
-        degree: u32::try_from(degree).map_err(negative)?,
-        alpha: named("kind of polynomials' alpha", spec.alpha)?,
-        planes: named("kind of a cylinder's planes", spec.planes)?,
-        ..Choice::default()
-    })
+    let form = named("integral", spec.form)?;
+    let mut choice = Choice::of(form);
+    if form == Form::Exact {
+        return Ok(choice);
+    }
+    choice.table = table(spec.table)?;
+    choice.texels = named("kind of a table's texels", spec.texels)?;
+    if form == Form::Volume {
+        choice.lengths = named("kind of a table's lengths", spec.lengths)?;
+    }
+    if form == Form::Cylindrical {
+        choice.planes = named("kind of a cylinder's planes", spec.planes)?;
+    }
+    if matches!(form, Form::Polynomial | Form::Auto) {
+        let degree = spec.degree;
+        let negative = |_| Error::Render(format!("polynomials have a degree from 1 to 8, and not {degree}"));
+        choice.degree = u32::try_from(degree).map_err(negative)?;
+        choice.alpha = named("kind of polynomials' alpha", spec.alpha)?;
+    }
+    Ok(choice)
+}
+
+fn table(size: [i32; 3]) -> Result<Option<[u32; 3]>> {
+    if size == [0, 0, 0] {
+        return Ok(None);
+    }
+    match size.map(u32::try_from) {
+        [Ok(front), Ok(back), Ok(depth)] => Ok(Some([front, back, depth])),
+        _ => {
+            let size = size.map(|n| n.to_string()).join(" x ");
+            Err(Error::Render(format!("a table of {size} texels cannot be; 0 x 0 x 0 is the default")))
+        }
+    }
 }
 
 fn set_mesh(session: &mut Session, mesh: &Mesh, matrix: [f64; 16]) -> Result<()> {
@@ -491,44 +485,4 @@ fn save_image(path: &str, width: u32, height: u32, pixels: &[f32], background: &
 /// A matrix whose rows lie one after another.
 fn rows(matrix: [f64; 16]) -> DMat4 {
     DMat4::from_cols_array(&matrix).transpose()
-}
-
-/// The numbers of a slice that is known to hold some type.
-fn cast<'a, T: bytemuck::Pod>(numbers: &Numbers<'a>) -> Result<&'a [T]> {
-    if numbers.bytes.is_empty() {
-        return Ok(&[]);
-    }
-    bytemuck::try_cast_slice(numbers.bytes)
-        .map_err(|e| Error::Mesh(format!("numbers that are not where they may be: {e}")))
-}
-
-/// A copy of numbers.
-fn values(numbers: &Numbers) -> Result<Values> {
-    Ok(match numbers.kind {
-        Type::I8 => Values::I8(cast(numbers)?.to_vec()),
-        Type::U8 => Values::U8(cast(numbers)?.to_vec()),
-        Type::I16 => Values::I16(cast(numbers)?.to_vec()),
-        Type::U16 => Values::U16(cast(numbers)?.to_vec()),
-        Type::I32 => Values::I32(cast(numbers)?.to_vec()),
-        Type::U32 => Values::U32(cast(numbers)?.to_vec()),
-        Type::I64 => Values::I64(cast(numbers)?.to_vec()),
-        Type::U64 => Values::U64(cast(numbers)?.to_vec()),
-        Type::F32 => Values::F32(cast(numbers)?.to_vec()),
-        _ => Values::F64(cast(numbers)?.to_vec()),
-    })
-}
-
-/// Points, of coordinates of any type.
-#[allow(clippy::cast_lossless, clippy::unnecessary_cast, reason = "one cast for ten types")]
-fn triples(numbers: &Numbers) -> Result<Vec<DVec3>> {
-    match numbers.kind {
-        Type::F64 => Ok(cast::<f64>(numbers)?.as_chunks().0.par_iter().map(|&p| DVec3::from_array(p)).collect()),
-        Type::F32 => {
-            let points = cast::<f32>(numbers)?.as_chunks().0;
-            Ok(points.par_iter().map(|p: &[f32; 3]| DVec3::from_array(p.map(f64::from))).collect())
-        }
-        _ => with_values!(&values(numbers)?, v => {
-            Ok(v.as_chunks().0.iter().map(|p: &[_; 3]| DVec3::from_array(p.map(|x| x as f64))).collect())
-        }),
-    }
 }

@@ -40,7 +40,7 @@ pub struct Geometry {
     /// The boundary faces.
     pub boundary: Boundary,
     /// The mesh's point that each point is; of several at one position, one of them.
-    point_of: Vec<u32>,
+    pub(crate) point_of: Vec<u32>,
     /// The tetrahedron, as [`Tetrahedra`] counts, that each cell is.
     tetrahedron_of: Vec<u32>,
     /// True if several points of the mesh share a position.

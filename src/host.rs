@@ -1,11 +1,15 @@
-//! What a program that embeds Halite needs around a [`Renderer`]: calls that never unwind, progress told on the
-//! caller's own thread, points under a matrix, and a log that is asked for.
+//! What a program that embeds Halite needs around a [`Renderer`]: calls that never unwind, progress reported on the
+//! caller's own thread, points under a matrix, and a log of its own.
+
+mod log;
+
+pub use log::{Log, carried};
 
 use crate::error::{Error, Result};
 use crate::field::Field;
 use crate::gpu::DeviceChoice;
 use crate::image::Image;
-use crate::integral::{Choice, Form};
+use crate::integral::Choice;
 use crate::mesh::Mesh;
 use crate::mesh::cells::Tetrahedra;
 use crate::render::{Engine, Renderer, Stats};
@@ -15,12 +19,10 @@ use glam::{DMat4, DVec3};
 use rayon::prelude::*;
 use serde::de::value::StrDeserializer;
 use serde::de::{DeserializeOwned, IntoDeserializer};
-use std::collections::VecDeque;
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
 /// How often the caller is told the progress of a frame.
@@ -76,6 +78,9 @@ pub struct Session {
     state: State,
     /// Whether the matrix of the mesh that is drawn turns right hands into left ones.
     mirrored: bool,
+    /// Points of the mesh that are not finite, ascending: their cells were left out when it was set.
+    hidden: Vec<usize>,
+    log: Log,
     failed: bool,
 }
 
@@ -90,33 +95,31 @@ enum State {
 
 impl Session {
     /// A session with `threads` threads of its own (0: one for each core), on a device as [`DeviceChoice::parse`] reads
-    /// it.
+    /// it. What it logs, now and in [`Session::guarded`], goes to `log`.
     ///
     /// # Errors
     /// Those of [`Renderer::with_engine`]; [`Error::Render`] if `engine` is none of [`ENGINES`].
-    pub fn new(threads: usize, device: &str, engine: &str) -> Result<Self> {
+    pub fn new(threads: usize, device: &str, engine: &str, log: Log) -> Result<Self> {
         if !engine.is_empty() && !ENGINES.contains(&engine.to_ascii_lowercase().as_str()) {
             let known = ENGINES.join("\", \"");
             return Err(Error::Render(format!("no engine is called \"{engine}\"; there are \"{known}\"")));
         }
         let engine = if engine.eq_ignore_ascii_case("project") { Engine::Project } else { Engine::Auto };
-        let renderer = Renderer::with_engine(threads, DeviceChoice::parse(device), engine)?;
-        Ok(Session { renderer, state: State::NoMesh, mirrored: false, failed: false })
+        let renderer = log.collect(|| Renderer::with_engine(threads, DeviceChoice::parse(device), engine))?;
+        Ok(Session { renderer, state: State::NoMesh, mirrored: false, hidden: vec![], log, failed: false })
     }
 
     /// Integrates in another form from now on; as at first, exactly, until this is called.
     ///
     /// # Errors
-    /// [`Error::Render`] if there can be no such table, or no such polynomials, be they asked for or not.
+    /// [`Error::Render`] if there can be no table of that form. What the form does not read is not judged.
     pub fn set_integral(&mut self, choice: Choice) -> Result<()> {
         choice.check(choice.size(0))?;
-        let polynomials = Choice { form: Form::Polynomial, table: None, ..choice };
-        polynomials.check(polynomials.size(0))?;
         self.renderer.set_integral(choice);
         Ok(())
     }
 
-    /// Runs `work` on this session. After a panic it is not what it should be, and says so.
+    /// Runs `work` on this session, and collects what it logs. After a panic it is not what it should be, and says so.
     ///
     /// # Errors
     /// Those of [`guard`]; [`Error::Render`] after a panic.
@@ -126,8 +129,9 @@ impl Session {
         }
         self.failed = true;
         let mut finished = false;
+        let log = self.log.clone();
         let result = guard(|| {
-            let result = work(self);
+            let result = log.collect(|| work(self));
             finished = true;
             result
         });
@@ -142,6 +146,7 @@ impl Session {
     /// [`Error::Mesh`] as [`Tetrahedra::new`], or if the matrix is not affine or not finite.
     pub fn set_mesh(&mut self, mesh: &Mesh, matrix: DMat4) -> Result<()> {
         check_matrix(matrix)?;
+        self.hidden = self.renderer.install(|| not_finite(mesh.points()));
         // Cells are split where the mesh has them, so that its pictures under a matrix do not depend on those before.
         let tetrahedra = match self.renderer.install(|| Tetrahedra::new(mesh)) {
             Err(Error::Empty(why)) => {
@@ -163,7 +168,6 @@ impl Session {
             Some(moved) if self.mirrored => self.renderer.load(&moved, mesh.cells().len(), tetrahedra),
             Some(moved) => {
                 self.renderer.set_mesh(mesh, tetrahedra);
-                // Points that are not finite belong to no cell that is drawn.
                 self.renderer.set_points(&moved)?;
             }
         }
@@ -171,8 +175,8 @@ impl Session {
         Ok(())
     }
 
-    /// Draws the mesh with its points moved, under another matrix. False if that cannot be: the mesh must then be set
-    /// again.
+    /// Draws the mesh with its points moved, under another matrix. False if that cannot be, because the matrix makes a
+    /// mirror image of what was drawn, or other points are not finite than were: the mesh must then be set again.
     ///
     /// # Errors
     /// [`Error::Mesh`] if there are not as many points as before, or the matrix is not affine or not finite.
@@ -180,6 +184,7 @@ impl Session {
         check_matrix(matrix)?;
         match self.state {
             State::NoMesh => Ok(false),
+            _ if self.renderer.install(|| not_finite(points)) != self.hidden => Ok(false),
             State::Empty => Ok(true),
             State::Mesh if self.mirrored != (matrix.determinant() < 0.0) => Ok(false),
             State::Mesh => {
@@ -224,10 +229,10 @@ impl Session {
                 share.store(done.to_bits(), Relaxed);
                 if stop.load(Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             };
-            let worker = scope.spawn(move || {
+            let worker = scope.spawn(carried(move || {
                 // The receiver outlives this thread.
                 let _ = sender.send(renderer.render(view, &tell));
-            });
+            }));
             loop {
                 match receiver.recv_timeout(TELL) {
                     Ok(drawn) => break drawn,
@@ -262,61 +267,21 @@ fn check_matrix(matrix: DMat4) -> Result<()> {
     Err(Error::Mesh("the matrix of the mesh is not affine, or not finite".into()))
 }
 
+/// Which points are not finite, ascending.
+fn not_finite(points: &[DVec3]) -> Vec<usize> {
+    points.par_iter().enumerate().filter(|(_, p)| !p.is_finite()).map(|(i, _)| i).collect()
+}
+
 /// `points` under an affine matrix; those that are not finite stay so.
 fn transformed(points: &[DVec3], matrix: DMat4) -> Vec<DVec3> {
     points.par_iter().map(|&p| matrix.transform_point3(p)).collect()
-}
-
-/// Lines of the log that nobody has taken yet; the oldest go first when there are too many.
-static LINES: OnceLock<Mutex<VecDeque<String>>> = OnceLock::new();
-const MOST_LINES: usize = 1000;
-
-/// Starts to keep the log: from now on [`take_log`] has it. Another log that this library was given stays as it is.
-pub fn keep_log() {
-    if LINES.set(Mutex::default()).is_ok() {
-        let _ = tracing_subscriber::fmt()
-            .with_max_level(tracing::Level::INFO)
-            .with_writer(|| Line)
-            .with_ansi(false)
-            .with_target(false)
-            .without_time()
-            .try_init();
-    }
-}
-
-/// The lines of the log since they were last taken, oldest first; each starts with its level, such as "WARN".
-pub fn take_log() -> Vec<String> {
-    LINES.get().map_or_else(Vec::new, |lines| lock(lines).drain(..).collect())
-}
-
-fn lock(lines: &Mutex<VecDeque<String>>) -> std::sync::MutexGuard<'_, VecDeque<String>> {
-    lines.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Where the subscriber writes each line at once.
-struct Line;
-
-impl std::io::Write for Line {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        if let Some(lines) = LINES.get() {
-            let mut lines = lock(lines);
-            lines.push_back(String::from_utf8_lossy(bytes).trim().to_owned());
-            if lines.len() > MOST_LINES {
-                lines.pop_front();
-            }
-        }
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        Ok(())
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::field::{Association, Component};
+    use crate::integral::Form;
     use crate::integral::choice::Texels;
     use crate::integral::table::Kind;
     use crate::mesh::generate;
@@ -333,7 +298,7 @@ mod tests {
     }
 
     fn session() -> Session {
-        let mut session = Session::new(2, "cpu", "auto").unwrap();
+        let mut session = Session::new(2, "cpu", "auto", Log::default()).unwrap();
         let opacity = vec![(0.0, 0.0), (0.4, 1.0), (0.6, 0.0), (1.0, 0.7)];
         session.set_transfer(
             &TransferFunction::new(vec![(0.0, [1.0, 0.5, 0.0]), (1.0, [0.0, 0.5, 1.0])], opacity, 0.3).unwrap(),
@@ -444,9 +409,9 @@ mod tests {
 
     #[test]
     fn unknown_names_are_refused_with_those_that_exist() {
-        let message = Session::new(1, "cpu", "magic").unwrap_err().to_string();
+        let message = Session::new(1, "cpu", "magic", Log::default()).unwrap_err().to_string();
         assert!(message.contains("magic") && message.contains("traverse") && message.contains("project"), "{message}");
-        let message = Session::new(1, "cpu", "project").unwrap_err().to_string();
+        let message = Session::new(1, "cpu", "project", Log::default()).unwrap_err().to_string();
         assert!(message.contains("graphics device") && message.contains("traverse"), "{message}");
         let message = named::<Form>("integral", "guess").unwrap_err().to_string();
         let known = "\"auto\", \"exact\", \"volume\", \"polynomial\", \"cylindrical\"";
@@ -475,12 +440,62 @@ mod tests {
         for (choice, part) in [
             (Choice { table: Some([1, 64, 16]), ..Choice::of(Form::Volume) }, "at least 2, 2 and 3"),
             (Choice { degree: 9, ..Choice::of(Form::Polynomial) }, "from 1 to 8, and not 9"),
-            // Wrong wherever it is said.
-            (Choice { degree: 0, ..Choice::default() }, "from 1 to 8, and not 0"),
+            (Choice { degree: 0, ..Choice::of(Form::Polynomial) }, "from 1 to 8, and not 0"),
         ] {
             let message = session.set_integral(choice).unwrap_err().to_string();
             assert!(message.contains(part), "{message}");
         }
         assert!(draw(&mut session).compare(&exact).unwrap().rmse <= fourth, "what is refused changes nothing");
+        session.set_integral(Choice { degree: 0, table: Some([1; 3]), ..Choice::default() }).unwrap();
+        assert_eq!(draw(&mut session), exact, "what the exact integral does not read is not judged");
+    }
+
+    #[test]
+    fn points_that_are_not_finite_leave_out_their_cells_under_any_matrix() {
+        let whole = mesh();
+        let mut points = whole.points().to_vec();
+        points[0].y = f64::NAN;
+        let broken = Mesh::new(points.clone(), whole.cells().clone(), vec![], vec![]).unwrap();
+        let values = |s: &mut Session| set_field(s, &whole);
+        let mut plain = session();
+        plain.set_mesh(&broken, DMat4::IDENTITY).unwrap();
+        values(&mut plain);
+        let expected = draw(&mut plain);
+        assert!(expected.pixels.iter().any(|p| p[3] > 0.1));
+        let there = DMat4::from_translation(DVec3::X * 1e-3);
+        for matrix in [DMat4::IDENTITY, there, DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0))] {
+            let mut other = session();
+            other.set_mesh(&broken, matrix).unwrap();
+            values(&mut other);
+            let first = draw(&mut other);
+            assert!(first.compare(&expected).unwrap().max < 0.03 || matrix.x_axis.x < 0.0);
+            if matrix.x_axis.x > 0.0 {
+                assert!(other.set_points(&points, DMat4::IDENTITY).unwrap());
+                assert!(draw(&mut other).compare(&expected).unwrap().max < 2e-5);
+                assert!(!other.set_points(whole.points(), matrix).unwrap());
+                points.swap(0, 1);
+                assert!(!other.set_points(&points, matrix).unwrap());
+                points.swap(0, 1);
+            }
+        }
+        // Not a cell is left, and then all are.
+        let nowhere = vec![DVec3::NAN; points.len()];
+        let mut empty = session();
+        empty.set_mesh(&Mesh::new(nowhere.clone(), whole.cells().clone(), vec![], vec![]).unwrap(), there).unwrap();
+        assert!(empty.set_points(&nowhere, DMat4::IDENTITY).unwrap());
+        assert!(!empty.set_points(whole.points(), DMat4::IDENTITY).unwrap());
+    }
+
+    #[test]
+    fn what_a_session_logs_is_its_own() {
+        let logs = [Log::default(), Log::default()];
+        let [mut first, _second] = [0, 1].map(|i| Session::new(1, "cpu", "auto", logs[i].clone()).unwrap());
+        let mut points = mesh().points().to_vec();
+        points[0].x = f64::NAN;
+        let broken = Mesh::new(points, mesh().cells().clone(), vec![], vec![]).unwrap();
+        first.guarded(|s| s.set_mesh(&broken, DMat4::IDENTITY)).unwrap();
+        let lines = logs[0].take();
+        assert!(lines.iter().any(|l| l.starts_with("WARN") && l.contains("not finite")), "{lines:?}");
+        assert!(logs[1].take().is_empty());
     }
 }

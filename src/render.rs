@@ -240,14 +240,20 @@ impl Renderer {
     /// inside out, and points that shared a position still must; else set the mesh.
     ///
     /// # Errors
-    /// [`Error::Render`] if there is no mesh; [`Error::Mesh`] if it has another number of points, or one is not finite.
+    /// [`Error::Render`] if there is no mesh; [`Error::Mesh`] if it has another number of points, or a cell that is
+    /// drawn has one that is not finite.
     pub fn set_points(&mut self, points: &[DVec3]) -> Result<()> {
         let mesh = self.mesh.as_mut().ok_or_else(|| Error::Render("points need a mesh first".into()))?;
-        if points.len() != mesh.points || !points.iter().all(|p| p.is_finite()) {
-            return Err(Error::Mesh(format!("{} points, all finite, must take the place of as many", mesh.points)));
+        if points.len() != mesh.points {
+            let [now, before] = [points.len(), mesh.points];
+            return Err(Error::Mesh(format!("{now} points cannot take the place of {before}")));
         }
         let scale = mesh.geometry.scale;
-        self.pool.install(|| mesh.geometry.set_points(&mesh.tetrahedra.points(points)));
+        let moved = self.pool.install(|| mesh.tetrahedra.points(points));
+        if let Some(p) = mesh.geometry.point_of.iter().find(|&&p| !moved[p as usize].is_finite()) {
+            return Err(Error::Mesh(format!("a cell that is drawn has the point {p}, which is not finite any more")));
+        }
+        self.pool.install(|| mesh.geometry.set_points(&moved));
         let scaled = mesh.geometry.scale != scale;
         (mesh.longest, self.key) = (None, None);
         self.backend.forget(Part::Points);

@@ -7,6 +7,9 @@
 
 #include "halite/src/ffi.rs.h"
 
+#include <atomic>
+#include <cstdint>
+#include <cstdlib>
 #include <mutex>
 
 namespace halite
@@ -14,8 +17,17 @@ namespace halite
 namespace
 {
 
-std::mutex LogMutex;
-std::function<void(Level, const std::string&)> Sink;
+#if defined(__linux__)
+// Mesa's selection of Vulkan devices asks Wayland, which complains on stderr where there is no session. The environment is
+// changed while the library is loaded, as other threads may read it later.
+__attribute__((constructor)) void hushMesa()
+{
+  if (!std::getenv("XDG_RUNTIME_DIR"))
+  {
+    setenv("NODEVICE_SELECT", "1", 0);
+  }
+}
+#endif
 
 Level levelOf(const std::string& line)
 {
@@ -26,43 +38,32 @@ Level levelOf(const std::string& line)
   return line.compare(0, 5, "ERROR") == 0 ? Level::Error : Level::Warning;
 }
 
-void drainLog()
+// Gives a sink the lines that were collected for it.
+void drain(const bridge::Log& lines, const Log& sink)
 {
-  std::function<void(Level, const std::string&)> sink;
-  {
-    std::lock_guard<std::mutex> lock(LogMutex);
-    sink = Sink;
-  }
   if (!sink)
   {
     return;
   }
-  for (const rust::String& raw : bridge::take_log_lines())
+  try
   {
-    const std::string line(raw.data(), raw.size());
-    const std::size_t space = line.find(' ');
-    sink(levelOf(line), space == std::string::npos ? line : line.substr(space + 1));
+    for (const rust::String& raw : bridge::take_lines(lines))
+    {
+      const std::string line(raw.data(), raw.size());
+      const std::size_t space = line.find(' ');
+      sink(levelOf(line), space == std::string::npos ? line : line.substr(space + 1));
+    }
+  }
+  catch (...)
+  {
+    // A log that cannot be written is no reason to fail.
   }
 }
 
-// Runs a call of the bridge: its errors become ours, and what it logged is handed on, whether it failed or not.
+// Runs a call of the bridge: its errors become ours.
 template <class Work>
 auto call(Work work) -> decltype(work())
 {
-  struct Drain
-  {
-    ~Drain()
-    {
-      try
-      {
-        drainLog();
-      }
-      catch (...)
-      {
-        // A log that cannot be written is no reason to fail.
-      }
-    }
-  } drain;
   try
   {
     return work();
@@ -73,24 +74,76 @@ auto call(Work work) -> decltype(work())
   }
 }
 
+// The same; what it logged is handed on, whether it failed or not, when `work` is gone.
+template <class Work>
+auto call(const bridge::Log& lines, const Log& sink, Work&& work) -> decltype(work())
+{
+  struct Drain
+  {
+    const bridge::Log& Lines;
+    const Log& Sink;
+    ~Drain() { drain(this->Lines, this->Sink); }
+  } drain{ lines, sink };
+  return call(std::forward<Work>(work));
+}
+
 std::size_t sizeOf(Type type)
 {
   static const std::size_t sizes[] = { 1, 1, 2, 2, 4, 4, 8, 8, 4, 8 };
-  return sizes[static_cast<int>(type)];
+  const auto index = static_cast<std::size_t>(type);
+  if (index >= sizeof sizes / sizeof *sizes)
+  {
+    throw Error("there is no type of numbers " + std::to_string(index));
+  }
+  return sizes[index];
+}
+
+// Whether so many numbers can lie there.
+void check(const char* what, const void* data, std::size_t count, std::size_t size)
+{
+  if (count == 0)
+  {
+    return;
+  }
+  if (!data)
+  {
+    throw Error(std::string(what) + ": " + std::to_string(count) + " numbers at a null pointer");
+  }
+  if (count > static_cast<std::size_t>(PTRDIFF_MAX) / size)
+  {
+    throw Error(std::string(what) + ": " + std::to_string(count) + " numbers are more than memory has room for");
+  }
+  if (reinterpret_cast<std::uintptr_t>(data) % size != 0)
+  {
+    throw Error(std::string(what) + ": numbers of " + std::to_string(size) + " bytes at an address that is no multiple of that");
+  }
 }
 
 template <class T>
-rust::Slice<const T> slice(const T* data, std::size_t count)
+rust::Slice<const T> slice(const char* what, const T* data, std::size_t count)
 {
   // An empty slice must not be null either.
   static const T none{};
+  check(what, data, count, sizeof(T));
   return { count ? data : &none, count };
 }
 
-bridge::Numbers numbers(const Numbers& n)
+bridge::Numbers numbers(const char* what, const Numbers& n)
 {
-  return { static_cast<bridge::Type>(n.type),
-    slice(static_cast<const std::uint8_t*>(n.data), n.count * sizeOf(n.type)) };
+  const std::size_t size = sizeOf(n.type);
+  check(what, n.data, n.count, size);
+  return { static_cast<bridge::Type>(n.type), slice(what, static_cast<const std::uint8_t*>(n.data), n.count * size) };
+}
+
+// Four numbers for each of so many pixels.
+std::size_t sizeOfImage(std::uint32_t width, std::uint32_t height)
+{
+  const std::size_t pixels = std::size_t(width) * height;
+  if (pixels > static_cast<std::size_t>(PTRDIFF_MAX) / 16)
+  {
+    throw Error("an image of " + std::to_string(width) + "x" + std::to_string(height) + " pixels is larger than memory");
+  }
+  return 4 * pixels;
 }
 
 rust::Str str(const std::string& s)
@@ -113,16 +166,6 @@ std::vector<T> copy(const rust::Vec<T>& v)
 
 Error::~Error() = default;
 
-void setLog(std::function<void(Level, const std::string&)> sink)
-{
-  if (sink)
-  {
-    call([] { bridge::keep_log_lines(); });
-  }
-  std::lock_guard<std::mutex> lock(LogMutex);
-  Sink = std::move(sink);
-}
-
 const char* version()
 {
   return HALITE_VERSION;
@@ -131,12 +174,23 @@ const char* version()
 struct Mesh::Inner
 {
   rust::Box<bridge::Mesh> Box;
+
+  // The mesh of a face that still has one.
+  static bridge::Mesh& Of(const Mesh& mesh)
+  {
+    if (!mesh.Data)
+    {
+      throw Error("this mesh was moved elsewhere");
+    }
+    return *mesh.Data->Box;
+  }
 };
 
-Mesh Mesh::open(const std::string& path)
+Mesh Mesh::open(const std::string& path, const Log& log)
 {
   Mesh mesh(Numbers(), Numbers(nullptr, 0, Type::UInt8), std::vector<std::int64_t>{ 0 }, std::vector<std::int64_t>{});
-  mesh.Data->Box = call([&] { return bridge::open_mesh(str(path), 0); });
+  const rust::Box<bridge::Log> lines = call([] { return bridge::new_log(); });
+  mesh.Data->Box = call(*lines, log, [&] { return bridge::open_mesh(str(path), 0, *lines); });
   return mesh;
 }
 
@@ -147,7 +201,8 @@ Mesh::Mesh(Numbers points, Numbers types, Numbers offsets, Numbers connectivity)
     throw Error("cell types are bytes");
   }
   this->Data.reset(new Inner{ call([&] {
-    return bridge::new_mesh(numbers(points), numbers(types).bytes, numbers(offsets), numbers(connectivity));
+    return bridge::new_mesh(numbers("points", points), numbers("cell types", types).bytes, numbers("offsets", offsets),
+      numbers("connectivity", connectivity));
   }) });
 }
 
@@ -157,20 +212,22 @@ Mesh::~Mesh() = default;
 
 void Mesh::addPolyhedra(Numbers cells, Numbers faces, Numbers points)
 {
-  call([&] { bridge::add_polyhedra(*this->Data->Box, numbers(cells), numbers(faces), numbers(points)); });
+  call([&] { bridge::add_polyhedra(Inner::Of(*this), numbers("starts of cells", cells), numbers("starts of faces", faces),
+      numbers("points of faces", points)); });
 }
 
 void Mesh::addArray(const std::string& name, Association association, std::size_t components, Numbers n)
 {
   call([&] {
-    bridge::add_array(*this->Data->Box, str(name), association == Association::Cells, components, numbers(n));
+    bridge::add_array(
+      Inner::Of(*this), str(name), association == Association::Cells, components, numbers(name.c_str(), n));
   });
 }
 
 std::vector<ArrayInfo> Mesh::arrays() const
 {
   std::vector<ArrayInfo> result;
-  for (const bridge::ArrayInfo& a : call([&] { return bridge::arrays(*this->Data->Box); }))
+  for (const bridge::ArrayInfo& a : call([&] { return bridge::arrays(Inner::Of(*this)); }))
   {
     result.push_back({ std::string(a.name), a.of_cells ? Association::Cells : Association::Points,
       static_cast<Type>(a.kind), a.components, a.tuples });
@@ -180,13 +237,13 @@ std::vector<ArrayInfo> Mesh::arrays() const
 
 std::vector<double> Mesh::arrayValues(std::size_t index) const
 {
-  return call([&] { return copy(bridge::array_values(*this->Data->Box, index)); });
+  return call([&] { return copy(bridge::array_values(Inner::Of(*this), index)); });
 }
 
 std::vector<CellCount> Mesh::cellCounts() const
 {
   std::vector<CellCount> result;
-  for (const bridge::CellCount& c : call([&] { return bridge::cell_counts(*this->Data->Box); }))
+  for (const bridge::CellCount& c : call([&] { return bridge::cell_counts(Inner::Of(*this)); }))
   {
     result.push_back({ c.vtk_type, std::string(c.name), c.count });
   }
@@ -195,31 +252,97 @@ std::vector<CellCount> Mesh::cellCounts() const
 
 std::vector<double> Mesh::points() const
 {
-  return call([&] { return copy(bridge::points(*this->Data->Box)); });
+  return call([&] { return copy(bridge::points(Inner::Of(*this))); });
 }
 
 std::vector<std::uint8_t> Mesh::types() const
 {
-  return call([&] { return copy(bridge::types(*this->Data->Box)); });
+  return call([&] { return copy(bridge::types(Inner::Of(*this))); });
 }
 
 std::vector<std::uint64_t> Mesh::offsets() const
 {
-  return call([&] { return copy(bridge::offsets(*this->Data->Box)); });
+  return call([&] { return copy(bridge::offsets(Inner::Of(*this))); });
 }
 
 std::vector<std::uint32_t> Mesh::connectivity() const
 {
-  return call([&] { return copy(bridge::connectivity(*this->Data->Box)); });
+  return call([&] { return copy(bridge::connectivity(Inner::Of(*this))); });
 }
 
 struct Renderer::Inner
 {
+  rust::Box<bridge::Log> Lines;
   rust::Box<bridge::Session> Box;
+  Log Sink;
+  std::atomic<bool> IsAtWork{ false };
+  // Of the calls before the one that is at work.
+  std::mutex LatestMutex;
+  Statistics Latest;
+
+  Inner(rust::Box<bridge::Log> lines, const Settings& s)
+    : Lines(std::move(lines))
+    , Box(call(*this->Lines, s.log, [&] { return bridge::new_session(s.threads, str(s.device), str(s.engine), *this->Lines); }))
+    , Sink(s.log)
+  {
+  }
+
+  static std::shared_ptr<Inner> Of(const std::shared_ptr<Inner>& data)
+  {
+    if (!data)
+    {
+      throw Error("this renderer was moved elsewhere");
+    }
+    return data;
+  }
+
+  // What makes a call the only one; ends with it.
+  struct Turn
+  {
+    std::atomic<bool>& Flag;
+    const bool IsMine;
+    explicit Turn(Inner& self)
+      : Flag(self.IsAtWork)
+      , IsMine(!self.IsAtWork.exchange(true))
+    {
+    }
+    ~Turn()
+    {
+      if (this->IsMine)
+      {
+        this->Flag = false;
+      }
+    }
+  };
+
+  // Runs a call on the session, of which there is one at a time. `data` lives as long as the call, whatever that calls back.
+  template <class Work>
+  static auto Run(std::shared_ptr<Inner> data, Work work) -> decltype(work(*data->Box))
+  {
+    Inner& self = *Of(data);
+    auto turn = std::make_unique<Turn>(self);
+    if (!turn->IsMine)
+    {
+      throw Error("this renderer is at work: what it calls back, and other threads, may use it when that call is over");
+    }
+    // The log is handed on when the turn is over, so that its receiver may use the renderer.
+    return call(*self.Lines, self.Sink, [&, turn = std::move(turn)] {
+      self.Keep();
+      return work(*self.Box);
+    });
+  }
+
+  void Keep()
+  {
+    const bridge::Stats s = bridge::stats(*this->Box);
+    const std::lock_guard<std::mutex> lock(this->LatestMutex);
+    this->Latest = { std::string(s.engine), std::string(s.device), std::string(s.adapter), s.cells, s.tetrahedra,
+      s.faces_ms, s.upload_ms, s.frame_ms, s.steps, s.repaired_rays, s.device_bytes, s.uploaded_bytes };
+  }
 };
 
 Renderer::Renderer(const Settings& s)
-  : Data(new Inner{ call([&] { return bridge::new_session(s.threads, str(s.device), str(s.engine)); }) })
+  : Data(std::make_shared<Inner>(call([] { return bridge::new_log(); }), s))
 {
   this->setIntegral(s.integral);
 }
@@ -230,17 +353,22 @@ Renderer::~Renderer() = default;
 
 void Renderer::setMesh(const Mesh& mesh, const Matrix* matrix)
 {
-  call([&] { bridge::set_mesh(*this->Data->Box, *mesh.Data->Box, orIdentity(matrix)); });
+  Inner::Run(this->Data,
+    [&](bridge::Session& session) { bridge::set_mesh(session, Mesh::Inner::Of(mesh), orIdentity(matrix)); });
 }
 
 bool Renderer::movePoints(Numbers points, const Matrix* matrix)
 {
-  return call([&] { return bridge::move_points(*this->Data->Box, numbers(points), orIdentity(matrix)); });
+  return Inner::Run(this->Data, [&](bridge::Session& session) {
+    return bridge::move_points(session, numbers("points", points), orIdentity(matrix));
+  });
 }
 
 bool Renderer::movePoints(const Mesh& mesh, const Matrix* matrix)
 {
-  return call([&] { return bridge::move_mesh(*this->Data->Box, *mesh.Data->Box, orIdentity(matrix)); });
+  return Inner::Run(this->Data, [&](bridge::Session& session) {
+    return bridge::move_mesh(session, Mesh::Inner::Of(mesh), orIdentity(matrix));
+  });
 }
 
 void Renderer::setField(const Mesh& mesh, const std::string& name, int component)
@@ -250,7 +378,8 @@ void Renderer::setField(const Mesh& mesh, const std::string& name, int component
   {
     if (arrays[i].name == name)
     {
-      call([&] { bridge::set_mesh_field(*this->Data->Box, *mesh.Data->Box, i, component); });
+      Inner::Run(this->Data,
+        [&](bridge::Session& session) { bridge::set_mesh_field(session, Mesh::Inner::Of(mesh), i, component); });
       return;
     }
   }
@@ -260,9 +389,9 @@ void Renderer::setField(const Mesh& mesh, const std::string& name, int component
 void Renderer::setField(
   const std::string& name, Association association, std::size_t components, int component, Numbers n)
 {
-  call([&] {
-    bridge::set_field(
-      *this->Data->Box, { str(name), association == Association::Cells, components, component }, numbers(n));
+  Inner::Run(this->Data, [&](bridge::Session& session) {
+    bridge::set_field(session, { str(name), association == Association::Cells, components, component },
+      numbers(name.c_str(), n));
   });
 }
 
@@ -277,61 +406,67 @@ void Renderer::setTransferFunction(const TransferFunction& function)
   {
     opacity.insert(opacity.end(), { knot.scalar, knot.opacity });
   }
-  call([&] {
-    bridge::set_transfer(*this->Data->Box,
-      { slice(color.data(), color.size()), slice(opacity.data(), opacity.size()), function.unitDistance,
-        function.convention == OpacityConvention::Opacity });
+  Inner::Run(this->Data, [&](bridge::Session& session) {
+    bridge::set_transfer(session,
+      { slice("colour knots", color.data(), color.size()), slice("opacity knots", opacity.data(), opacity.size()),
+        function.unitDistance, function.convention == OpacityConvention::Opacity });
   });
 }
 
 void Renderer::setIntegral(const Integral& i)
 {
-  call([&] {
-    bridge::set_integral(*this->Data->Box,
+  Inner::Run(this->Data, [&](bridge::Session& session) {
+    bridge::set_integral(session,
       { str(i.form), i.table, str(i.lengths), str(i.texels), i.degree, str(i.alpha), str(i.planes) });
   });
 }
 
 bool Renderer::render(const View& view, float* pixels, const Progress& progress)
 {
-  if ((view.worldToEye != nullptr) != (view.eyeToClip != nullptr))
+  if (view.worldToEye.has_value() != view.eyeToClip.has_value())
   {
     throw Error("the view has one of its two matrices");
   }
+  const std::size_t count = sizeOfImage(view.width, view.height);
+  check("pixels", pixels, count, sizeof(float));
   std::vector<double> planes;
   for (const ClippingPlane& p : view.planes)
   {
     planes.insert(planes.end(), p.origin.begin(), p.origin.end());
     planes.insert(planes.end(), p.normal.begin(), p.normal.end());
   }
+  // What is called back may change the view.
+  const std::vector<float> depths = view.depths;
   const Camera& c = view.camera;
-  const std::size_t count = std::size_t(view.width) * view.height;
-  const bridge::ViewSpec spec{ view.width, view.height, view.bottomUp, view.maximum, view.worldToEye != nullptr,
-    orIdentity(view.worldToEye), orIdentity(view.eyeToClip),
+  const bridge::ViewSpec spec{ view.width, view.height, view.bottomUp, view.maximum, view.worldToEye.has_value(),
+    view.worldToEye.value_or(Matrix{}), view.eyeToClip.value_or(Matrix{}),
     { c.position, c.focalPoint, c.viewUp, c.parallel, c.parallel ? c.parallelScale : c.viewAngle, c.clippingRange[0],
       c.clippingRange[1] },
-    slice(planes.data(), planes.size()), slice(view.depths, view.depths ? count : 0) };
+    slice("clipping planes", planes.data(), planes.size()), slice("depths", depths.data(), depths.size()) };
   const bridge::Progress tell(progress);
   static float none;
-  return call([&] {
-    return bridge::render(
-      *this->Data->Box, spec, rust::Slice<float>(count ? pixels : &none, 4 * count), tell);
+  return Inner::Run(this->Data, [&](bridge::Session& session) {
+    return bridge::render(session, spec, rust::Slice<float>(count ? pixels : &none, count), tell);
   });
 }
 
 Statistics Renderer::statistics() const
 {
-  const bridge::Stats s = call([&] { return bridge::stats(*this->Data->Box); });
-  return { std::string(s.engine), std::string(s.device), std::string(s.adapter), s.cells, s.tetrahedra, s.faces_ms,
-    s.upload_ms, s.frame_ms, s.steps, s.repaired_rays, s.device_bytes, s.uploaded_bytes };
+  const std::shared_ptr<Inner> data = Inner::Of(this->Data);
+  if (const Inner::Turn turn(*data); turn.IsMine)
+  {
+    call([&] { data->Keep(); });
+  }
+  const std::lock_guard<std::mutex> lock(data->LatestMutex);
+  return data->Latest;
 }
 
 void saveImage(const std::string& path, std::uint32_t width, std::uint32_t height, const float* pixels,
   const std::array<float, 3>* background)
 {
   call([&] {
-    bridge::save_image(str(path), width, height, slice(pixels, 4 * std::size_t(width) * height),
-      slice(background ? background->data() : nullptr, background ? 3 : 0));
+    bridge::save_image(str(path), width, height, slice("pixels", pixels, sizeOfImage(width, height)),
+      slice("background", background ? background->data() : nullptr, background ? 3 : 0));
   });
 }
 

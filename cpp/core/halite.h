@@ -19,8 +19,8 @@
  * @endcode
  *
  * What fails throws halite::Error, whose what() is one line that says what, where, and what would help; no call ends the
- * program. Objects may be moved, not copied; one may be used by one thread at a time, two by two at once. Until version 1,
- * a new minor version may change this face, and has another SOVERSION then.
+ * program. Meshes and renderers may be moved, not copied; one may be used by one thread at a time, two by two at once. Until
+ * version 1, a new minor version may change this face, and has another SOVERSION then.
  */
 #pragma once
 
@@ -29,6 +29,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -140,9 +141,9 @@ enum class Level
   Error
 };
 
-/// Sends the log to `sink` from now on. It is called at the end of those calls of this library that logged something,
-/// on their thread. An empty sink ends that.
-HALITE_EXPORT void setLog(std::function<void(Level, const std::string&)> sink);
+/// Receives the log of one renderer, or of a file that is read, line by line: at the end of those calls that logged
+/// something, on their thread. What it throws is dropped.
+using Log = std::function<void(Level, const std::string&)>;
 
 /// The version of the library, such as "0.1.0".
 HALITE_EXPORT const char* version();
@@ -151,8 +152,8 @@ HALITE_EXPORT const char* version();
 class HALITE_EXPORT Mesh
 {
 public:
-  /// Reads a .vtu or legacy .vtk file.
-  static Mesh open(const std::string& path);
+  /// Reads a .vtu or legacy .vtk file; what is wrong with it but does no harm goes to `log`.
+  static Mesh open(const std::string& path, const Log& log = {});
 
   /// Makes a mesh of `points` (x, y, z for each; any type of number) and cells as vtkCellArray keeps them: `types` has
   /// VTK's type of each cell, cell i has the points `connectivity[offsets[i]]` up to `connectivity[offsets[i + 1]]`, so
@@ -254,7 +255,7 @@ struct ClippingPlane
   std::array<double, 3> normal;
 };
 
-/// What to draw, and where from.
+/// What to draw, and where from. It holds all that it says, so it may be copied and kept.
 struct View
 {
   std::uint32_t width = 640;
@@ -262,11 +263,12 @@ struct View
   Camera camera;
   /// OpenGL's matrices, rows one after another, take the place of the camera if they are given: from the world to the
   /// eye, and from there to clip coordinates. Any frustum can be had so.
-  const std::array<double, 16>* worldToEye = nullptr;
-  const std::array<double, 16>* eyeToClip = nullptr;
+  std::optional<std::array<double, 16>> worldToEye;
+  std::optional<std::array<double, 16>> eyeToClip;
   std::vector<ClippingPlane> planes;
-  /// One depth in [0, 1] for each pixel, as OpenGL has it, at which its ray ends; needs matrices or a clipping range.
-  const float* depths = nullptr;
+  /// One depth in [0, 1] for each pixel, as OpenGL has it, at which its ray ends; needs matrices or a clipping range. Empty:
+  /// nothing ends rays.
+  std::vector<float> depths;
   /// Whether row 0 of depths and pixels is the lowest, as in OpenGL, or the uppermost.
   bool bottomUp = false;
   /// Draw the largest value along each ray instead of the integral.
@@ -282,7 +284,8 @@ struct Statistics
   std::uint64_t steps = 0, repairedRays = 0, deviceBytes = 0, uploadedBytes = 0;
 };
 
-/// The form of the ray integral, by the names that scenes have for it. Empty names mean the first that is said here.
+/// The form of the ray integral, by the names that scenes have for it. Empty names mean the first that is said here. What
+/// the form does not use is not read.
 struct Integral
 {
   /// "exact"; "volume", "polynomial" or "cylindrical": a pre-integrated table; or "auto": exact, or a table where
@@ -316,14 +319,17 @@ struct Settings
   std::string engine;
   /// See Renderer::setIntegral.
   Integral integral;
+  /// What the renderer logs; nobody else's lines.
+  Log log;
 };
 
-/// Draws one mesh as often as wanted; keeps what does not change between frames.
+/// Draws one mesh as often as wanted; keeps what does not change between frames. While a call is at work, all others but
+/// statistics() and the destructor throw an Error and change nothing, on this thread (from what is called back) and others.
 class HALITE_EXPORT Renderer
 {
 public:
-  /// Told the share that is done, in [0, 1], every 20 ms while a frame is drawn, on the thread that called; false ends
-  /// it. It may throw: render() then throws an Error with what it said.
+  /// Receives the share that is done, in [0, 1], every 20 ms while a frame is drawn, on the thread that called; false ends
+  /// the frame. It may throw anything: render() then throws an Error, with what a std::exception said.
   using Progress = std::function<bool(double)>;
   /// A matrix from the mesh's coordinates to the world, rows one after another; affine.
   using Matrix = std::array<double, 16>;
@@ -337,7 +343,7 @@ public:
   /// world.
   void setMesh(const Mesh& mesh, const Matrix* matrix = nullptr);
   /// Moves the points of the mesh, or only its matrix, and keeps all else. False if that cannot be, because the new
-  /// matrix makes a mirror image of the old one: then set the mesh again.
+  /// matrix makes a mirror image of the old one, or other points are not finite than were: then set the mesh again.
   bool movePoints(Numbers points, const Matrix* matrix = nullptr);
   bool movePoints(const Mesh& mesh, const Matrix* matrix = nullptr);
   /// Draws an array of the mesh.
@@ -348,15 +354,17 @@ public:
   /// Integrates in another form from the next frame on, which waits for its table if one is named. Where the transfer
   /// function alone changes, frames are exact until the new table is built, which happens meanwhile.
   void setIntegral(const Integral&);
-  /// Draws into `pixels`: linear premultiplied red, green, blue and opacity of each pixel, row by row. False if
-  /// `progress` ended it; `pixels` are then as they were.
+  /// Draws into `pixels`, which has room for 4 x width x height: linear premultiplied red, green, blue and opacity of each
+  /// pixel, row by row. False if `progress` ended it; `pixels` are then as they were.
   bool render(const View& view, float* pixels, const Progress& progress = {});
 
+  /// Of the calls that are over.
   Statistics statistics() const;
 
 private:
   struct Inner;
-  std::unique_ptr<Inner> Data;
+  // Shared with a call that is at work: a renderer may go meanwhile.
+  std::shared_ptr<Inner> Data;
 };
 
 /// Writes `pixels` as render() makes them (row 0 uppermost) to a .png, .exr or .npy file. A .png shows them over

@@ -2,7 +2,10 @@
 // What the bridge calls back: private to this library, not installed.
 #pragma once
 
+#include <exception>
 #include <functional>
+#include <stdexcept>
+#include <utility>
 
 namespace halite
 {
@@ -17,8 +20,23 @@ public:
   {
   }
 
-  // Whether to go on. What it throws becomes an error of the call that it interrupts.
-  bool tell(double share) const { return !this->Tell || this->Tell(share); }
+  // Whether to go on. What it throws becomes an error of the call that it interrupts; the bridge can carry a
+  // std::exception only, and ends the program at anything else.
+  bool tell(double share) const
+  {
+    try
+    {
+      return !this->Tell || this->Tell(share);
+    }
+    catch (const std::exception&)
+    {
+      throw;
+    }
+    catch (...)
+    {
+      throw std::runtime_error("the progress function threw something that is no std::exception");
+    }
+  }
 
 private:
   std::function<bool(double)> Tell;

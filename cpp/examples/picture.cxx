@@ -17,8 +17,8 @@ int main(int argc, char** argv)
   }
   try
   {
-    halite::setLog([](halite::Level, const std::string& line) { std::fprintf(stderr, "%s\n", line.c_str()); });
-    const halite::Mesh mesh = halite::Mesh::open(argv[1]);
+    const halite::Log log = [](halite::Level, const std::string& line) { std::fprintf(stderr, "%s\n", line.c_str()); };
+    const halite::Mesh mesh = halite::Mesh::open(argv[1], log);
     for (const auto& cells : mesh.cellCounts())
     {
       std::printf("%zu cells: %s\n", cells.count, cells.name.c_str());
@@ -68,7 +68,9 @@ int main(int argc, char** argv)
     view.camera.position[2] += 0.8 * size;
     view.camera.viewUp = { 0, 0, 1 };
 
-    halite::Renderer renderer;
+    halite::Settings settings;
+    settings.log = log;
+    halite::Renderer renderer(settings);
     renderer.setMesh(mesh);
     renderer.setField(mesh, found->name);
     renderer.setTransferFunction(function);

@@ -88,13 +88,13 @@ def test_bad_settings_are_one_error_and_can_be_mended():
     # What is said names what there is.
     cases = [
         (dict(Integral="guess"), "polynomial"),
-        (dict(PolynomialDegree=9), "from 1 to 8, and not 9"),
-        (dict(PolynomialDegree=-3), "from 1 to 8, and not -3"),
-        (dict(TableLengths="short"), "log-normalised"),
-        (dict(TableTexels="double"), "unorm16"),
-        (dict(PolynomialAlpha="none"), "exponential"),
-        (dict(CylinderPlanes="three"), "packed"),
-        (dict(TableSize=(8, -8, 8)), "8 x -8 x 8"),
+        (dict(Integral="polynomial", PolynomialDegree=9), "from 1 to 8, and not 9"),
+        (dict(Integral="auto", PolynomialDegree=-3), "from 1 to 8, and not -3"),
+        (dict(Integral="volume", TableLengths="short"), "log-normalised"),
+        (dict(Integral="cylindrical", TableTexels="double"), "unorm16"),
+        (dict(Integral="polynomial", PolynomialAlpha="none"), "exponential"),
+        (dict(Integral="cylindrical", CylinderPlanes="three"), "packed"),
+        (dict(Integral="polynomial", TableSize=(8, -8, 8)), "8 x -8 x 8"),
         (dict(Integral="volume", TableSize=(1, 8, 8)), "at least 2, 2 and 3"),
         (dict(Integral="cylindrical", TableSize=(8, 8, 6)), "multiple of 4"),
     ]

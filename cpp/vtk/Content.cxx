@@ -5,10 +5,8 @@
 #include "vtkHaliteCompatibility.h"
 
 #include "vtkColorTransferFunction.h"
-#include "vtkDataArray.h"
 #include "vtkMatrix4x4.h"
 #include "vtkNew.h"
-#include "vtkUnstructuredGridBase.h"
 #include "vtkVolume.h"
 #include "vtkVolumeProperty.h"
 

@@ -8,9 +8,11 @@
 
 #include "halite.h"
 
+#include "vtkDataArray.h"
+#include "vtkSmartPointer.h"
+#include "vtkUnstructuredGridBase.h"
+
 VTK_ABI_NAMESPACE_BEGIN
-class vtkDataArray;
-class vtkUnstructuredGridBase;
 class vtkVolume;
 VTK_ABI_NAMESPACE_END
 
@@ -18,9 +20,9 @@ struct Content
 {
   // How the core is to work.
   halite::Settings Settings;
-  vtkUnstructuredGridBase* Grid = nullptr;
+  vtkSmartPointer<vtkUnstructuredGridBase> Grid;
   halite::Renderer::Matrix Placement{};
-  vtkDataArray* Array = nullptr;
+  vtkSmartPointer<vtkDataArray> Array;
   halite::Association Association = halite::Association::Points;
   int Component = 0;
   halite::TransferFunction Function;

@@ -4,6 +4,7 @@
 #include "MeshView.h"
 
 #include "vtkDataArray.h"
+#include "vtkLogger.h"
 
 namespace
 {
@@ -21,6 +22,30 @@ bool IsNew(Key& held, const Key& wanted)
 
 }
 
+template <class Work>
+auto Core::Do(Step step, Work work) -> decltype(work())
+{
+  struct Close
+  {
+    Core& Self;
+    Step Now;
+    ~Close()
+    {
+      const std::vector<std::string> fresh = this->Self.Messages.New(this->Now, this->Self.Said);
+      this->Self.Warnings.insert(this->Self.Warnings.end(), fresh.begin(), fresh.end());
+    }
+  } close{ *this, step };
+  this->Said.clear();
+  return work();
+}
+
+std::vector<std::string> Core::TakeWarnings()
+{
+  std::vector<std::string> warnings;
+  warnings.swap(this->Warnings);
+  return warnings;
+}
+
 void Core::Hold(const Content& content)
 {
   MeshView view;
@@ -28,7 +53,18 @@ void Core::Hold(const Content& content)
   {
     // The old one's memory is free before the new one takes its own.
     this->Renderer.reset();
-    this->Renderer.reset(new halite::Renderer(content.Settings));
+    halite::Settings settings = content.Settings;
+    settings.log = [this](halite::Level level, const std::string& line) {
+      if (level == halite::Level::Info)
+      {
+        vtkLog(TRACE, << "Halite: " << line);
+      }
+      else
+      {
+        this->Said.push_back(line);
+      }
+    };
+    this->Do(Start, [&] { this->Renderer.reset(new halite::Renderer(settings)); });
     this->SettingsKey = content.SettingsKey;
     this->IntegralKey = content.IntegralKey;
     this->MeshKey = this->PlacementKey = this->FieldKey = this->FunctionKey = Key();
@@ -47,7 +83,7 @@ void Core::Hold(const Content& content)
   if (!hasMesh)
   {
     this->MeshKey = this->FieldKey = Key();
-    this->Renderer->setMesh(view.Mesh(content.Grid), &content.Placement);
+    this->Do(Mesh, [&] { this->Renderer->setMesh(view.Mesh(content.Grid), &content.Placement); });
     ++this->Done.Meshes;
     this->MeshKey = content.MeshKey;
   }
@@ -58,14 +94,16 @@ void Core::Hold(const Content& content)
     const halite::Numbers numbers = view.Numbers(content.Array, content.Component);
     const bool isOne = numbers.count == static_cast<std::size_t>(content.Array->GetNumberOfTuples());
     const char* name = content.Array->GetName();
-    this->Renderer->setField(
-      name ? name : "", content.Association, isOne ? 1 : n, isOne && n > 1 ? 0 : content.Component, numbers);
+    this->Do(Field, [&] {
+      this->Renderer->setField(
+        name ? name : "", content.Association, isOne ? 1 : n, isOne && n > 1 ? 0 : content.Component, numbers);
+    });
     ++this->Done.Fields;
     this->FieldKey = content.FieldKey;
   }
   if (IsNew(this->FunctionKey, content.FunctionKey))
   {
-    this->Renderer->setTransferFunction(content.Function);
+    this->Do(Function, [&] { this->Renderer->setTransferFunction(content.Function); });
     ++this->Done.Functions;
     this->FunctionKey = content.FunctionKey;
   }
@@ -75,7 +113,7 @@ void Core::Hold(const Content& content)
 bool Core::Draw(const halite::View& view, std::vector<float>& pixels, const halite::Renderer::Progress& progress)
 {
   pixels.resize(std::size_t(4) * view.width * view.height);
-  const bool finished = this->Renderer->render(view, pixels.data(), progress);
+  const bool finished = this->Do(Frame, [&] { return this->Renderer->render(view, pixels.data(), progress); });
   ++this->Done.Frames;
   return finished;
 }

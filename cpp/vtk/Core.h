@@ -4,6 +4,7 @@
 
 #include "Content.h"
 #include "Key.h"
+#include "Messages.h"
 
 #include "vtkType.h"
 
@@ -30,8 +31,25 @@ public:
   // Of what drew last; nothing before that.
   halite::Statistics GetStatistics() const;
 
+  // Warnings since this was called last, each once while it holds.
+  std::vector<std::string> TakeWarnings();
+
 private:
+  enum Step
+  {
+    Start,
+    Mesh,
+    Field,
+    Function,
+    Frame
+  };
+  template <class Work>
+  auto Do(Step step, Work work) -> decltype(work());
+
   std::unique_ptr<halite::Renderer> Renderer;
   Key SettingsKey, IntegralKey, MeshKey, PlacementKey, FieldKey, FunctionKey;
   Counts Done;
+  ::Messages Messages;
+  // What a step that is at work has warned of, and what is to be said.
+  std::vector<std::string> Said, Warnings;
 };

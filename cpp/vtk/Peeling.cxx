@@ -61,9 +61,10 @@ const char* const Questions[] = {
   "}\n",
 };
 
-// Where a volume is the first of a stage its picture is what is written; others go over it, as they come from far to
-// near. What lies before all layers may be kept until the first layer was drawn: VTK's layers have 8 bits, and what is
-// written less often is rounded less often.
+// A picture goes over what other volumes have left in this stage, VTK's among them, as they come from far to near; their
+// targets start empty, in front of the layers with what was peeled before. What lies before all layers may be kept until the
+// first layer was drawn: VTK's layers have 8 bits, and what is written less often is rounded less often. Then the volume
+// must be alone, as it takes the place of all that was there.
 const char* const Answers[] = {
   "//VTK::System::Dec\n"
   "//VTK::Output::Dec\n"
@@ -77,13 +78,13 @@ const char* const Answers[] = {
   "//VTK::Output::Dec\n"
   "in vec2 texCoord;\n"
   "uniform sampler2D kept, front, back, lastFrontColorTex;\n"
-  "uniform int first;\n"
+  "uniform int alone;\n"
   "void main() {\n"
   "  gl_FragData[0] = texture(back, texCoord);\n"
   "  vec4 before = texture(kept, texCoord);\n"
   "  vec4 last = texture(lastFrontColorTex, texCoord);\n"
   "  vec4 new = texture(front, texCoord);\n"
-  "  gl_FragData[1] = first != 0 ? before + (1.0 - before.a) * (last + (1.0 - last.a) * new)\n"
+  "  gl_FragData[1] = alone != 0 ? before + (1.0 - before.a) * (last + (1.0 - last.a) * new)\n"
   "                              : vec4(last.rgb * new.a + (1.0 - last.a) * new.rgb, new.a);\n"
   "}\n",
   "//VTK::System::Dec\n"
@@ -92,13 +93,6 @@ const char* const Answers[] = {
   "uniform sampler2D back;\n"
   "void main() { gl_FragData[0] = texture(back, texCoord); }\n",
 };
-
-// The stage in which a volume was drawn last: the pass is modified whenever it turns to volumes.
-thread_local struct
-{
-  vtkOpenGLRenderPass* Pass;
-  vtkMTimeType Time;
-} Latest;
 
 }
 
@@ -146,6 +140,7 @@ vtkOpenGLQuadHelper& Peeling::Ready(std::unique_ptr<vtkOpenGLQuadHelper>& quad, 
   }
   if (!quad->Program)
   {
+    quad.reset();
     throw std::runtime_error("the window refuses the shaders for depth peeling");
   }
   return *quad;
@@ -198,13 +193,9 @@ void Peeling::Ask(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolum
   }
 }
 
-void Peeling::Answer(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolume* volume,
+void Peeling::Answer(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolume* volume, bool isAlone,
   vtkTextureObject* kept, vtkTextureObject* front, vtkTextureObject* back)
 {
-  const bool first = Latest.Pass != pass || Latest.Time != pass->GetMTime();
-  Latest.Pass = pass;
-  Latest.Time = pass->GetMTime();
-
   vtkOpenGLState* state = this->Window->GetState();
   vtkOpenGLState::ScopedglEnableDisable depthTest(state, OpenGL::DepthTest);
   vtkOpenGLState::ScopedglEnableDisable blend(state, OpenGL::Blend);
@@ -212,7 +203,7 @@ void Peeling::Answer(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVo
   vtkOpenGLState::ScopedglBlendFuncSeparate blendFunction(state);
   state->vtkglDisable(OpenGL::DepthTest);
   state->vtkglDisable(OpenGL::CullFace);
-  const bool replaces = first && this->Now != Rest;
+  const bool replaces = isAlone && this->Now == Between;
   replaces ? state->vtkglDisable(OpenGL::Blend) : state->vtkglEnable(OpenGL::Blend);
   state->vtkglBlendFuncSeparate(OpenGL::One, OpenGL::OneMinusSourceAlpha, OpenGL::One, OpenGL::OneMinusSourceAlpha);
   state->vtkglBlendEquation(OpenGL::Add);
@@ -226,7 +217,7 @@ void Peeling::Answer(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVo
     textures[k]->Activate();
     quad.Program->SetUniformi(names[k], textures[k]->GetTextureUnit());
   }
-  quad.Program->SetUniformi("first", first);
+  quad.Program->SetUniformi("alone", isAlone);
   quad.Render();
   for (vtkTextureObject* texture : textures)
   {

@@ -50,10 +50,10 @@ public:
   // Whether what was asked for last lies before and behind all layers; it starts a frame.
   bool IsOutside() const { return this->Now == Outside; }
 
-  // Gives it the pictures of these parts, premultiplied. What was kept goes before all layers that were drawn until
-  // now.
-  void Answer(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolume* volume, vtkTextureObject* kept,
-    vtkTextureObject* front, vtkTextureObject* back);
+  // Gives it the pictures of these parts, premultiplied. What was kept goes before all layers that were drawn until now; that
+  // is only for a volume that is alone in the scene.
+  void Answer(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolume* volume, bool isAlone,
+    vtkTextureObject* kept, vtkTextureObject* front, vtkTextureObject* back);
 
 private:
   // What is drawn: all before and behind the layers, then what is between them, then what was not reached.

@@ -4,10 +4,13 @@
 #include "OpenGLNumbers.h"
 #include "Peeling.h"
 
+#include "vtkNew.h"
 #include "vtkOpenGLQuadHelper.h"
 #include "vtkOpenGLRenderWindow.h"
 #include "vtkOpenGLShaderCache.h"
 #include "vtkOpenGLState.h"
+#include "vtkPixelBufferObject.h"
+#include "vtkRenderer.h"
 #include "vtkShaderProgram.h"
 #include "vtkTextureObject.h"
 
@@ -21,7 +24,29 @@ const char* const Fragment = "//VTK::System::Dec\n"
                              "//VTK::Output::Dec\n"
                              "in vec2 texCoord;\n"
                              "uniform sampler2D picture;\n"
-                             "void main() { gl_FragData[0] = texture(picture, texCoord); }\n";
+                             "void main() {\n"
+                             "  gl_FragData[0] = texture(picture, texCoord);\n"
+                             // What passes keep beside colours, such as positions, stays as it is.
+                             "  gl_FragData[1] = gl_FragData[2] = gl_FragData[3] = vec4(0.0);\n"
+                             "  gl_FragData[4] = gl_FragData[5] = gl_FragData[6] = gl_FragData[7] = vec4(0.0);\n"
+                             "}\n";
+
+// The depths of the frame buffer that is bound.
+bool ReadBoundDepths(vtkOpenGLRenderWindow* window, const Viewport& v, std::vector<float>& depths)
+{
+  vtkNew<vtkTextureObject> texture;
+  texture->SetContext(window);
+  const auto width = static_cast<unsigned int>(v.Width), height = static_cast<unsigned int>(v.Height);
+  if (!texture->AllocateDepth(width, height, vtkTextureObject::Float32))
+  {
+    return false;
+  }
+  texture->CopyFromFrameBuffer(v.X, v.Y, 0, 0, v.Width, v.Height);
+  const auto packed = vtkSmartPointer<vtkPixelBufferObject>::Take(texture->Download());
+  unsigned int size[2] = { width, height };
+  vtkIdType steps[2] = { 0, 0 };
+  return packed && packed->Download2D(VTK_FLOAT, depths.data(), size, 1, steps);
+}
 
 }
 
@@ -46,13 +71,42 @@ Peeling& Presenter::GetPeeling()
   return *this->Peels;
 }
 
+bool Presenter::HasContext(vtkOpenGLRenderWindow* window)
+{
+  if (window->IsA("vtkGenericOpenGLRenderWindow"))
+  {
+    return true;
+  }
+  window->MakeCurrent();
+  return window->IsCurrent();
+}
+
+Viewport Presenter::ViewportOf(vtkOpenGLRenderWindow* window, vtkRenderer* renderer, bool isInPass)
+{
+  Viewport v;
+  if (isInPass)
+  {
+    int bounds[4] = { 0, 0, 0, 0 };
+    window->GetState()->vtkglGetIntegerv(OpenGL::Viewport, bounds);
+    v = { bounds[0], bounds[1], bounds[2], bounds[3], true };
+  }
+  else
+  {
+    renderer->GetTiledSizeAndOrigin(&v.Width, &v.Height, &v.X, &v.Y);
+  }
+  return v;
+}
+
 void Presenter::ReadDepths(
   vtkOpenGLRenderWindow* window, const Viewport& v, int across, int down, std::vector<float>& depths)
 {
   // VTK's call resolves several samples to one, and disables the scissor test.
   vtkOpenGLState::ScopedglEnableDisable scissor(window->GetState(), OpenGL::ScissorTest);
-  depths.resize(static_cast<std::size_t>(v.Width) * v.Height);
-  if (!window->GetZbufferData(v.X, v.Y, v.X + v.Width - 1, v.Y + v.Height - 1, depths.data()))
+  depths.assign(static_cast<std::size_t>(v.Width) * v.Height, 1.0f);
+  const bool isRead = v.IsOfPass
+    ? ReadBoundDepths(window, v, depths)
+    : window->GetZbufferData(v.X, v.Y, v.X + v.Width - 1, v.Y + v.Height - 1, depths.data()) != 0;
+  if (!isRead)
   {
     throw std::runtime_error("the depth buffer of the window cannot be read");
   }
@@ -119,6 +173,7 @@ void Presenter::Present(vtkTextureObject* texture, const Viewport& v)
   }
   if (!this->Quad->Program)
   {
+    this->Quad.reset();
     throw std::runtime_error("the window refuses the shader that draws pictures");
   }
   texture->Activate();

@@ -20,10 +20,12 @@ class vtkTextureObject;
 class vtkWindow;
 VTK_ABI_NAMESPACE_END
 
-// The part of a window that a renderer draws to, in pixels from its lower left corner.
+// The part of a frame buffer that a renderer draws to, in pixels from its lower left corner.
 struct Viewport
 {
   int X = 0, Y = 0, Width = 0, Height = 0;
+  // Whether the frame buffer is that of a render pass, and not the window's.
+  bool IsOfPass = false;
 };
 
 // What one window keeps to show pictures.
@@ -34,6 +36,12 @@ public:
   ~Presenter();
 
   vtkOpenGLRenderWindow* GetWindow() const;
+
+  // Makes the window's context the current one. False if it has none: before it was set up, and after it was finalized.
+  static bool HasContext(vtkOpenGLRenderWindow* window);
+
+  // Where the renderer draws just now: render passes have frame buffers of other sizes than the window's.
+  static Viewport ViewportOf(vtkOpenGLRenderWindow* window, vtkRenderer* renderer, bool isInPass);
 
   // The depths of what is drawn in the viewport, row 0 lowest; `across` x `down` of them, at the middles of as many
   // fields.

@@ -41,14 +41,15 @@ void MatricesOf(vtkRenderer* renderer, halite::Renderer::Matrix& toEye, halite::
 
 SceneView::SceneView(vtkRenderer* renderer, int width, int height, bool isMaximum, vtkPlaneCollection* planes)
 {
-  MatricesOf(renderer, this->ToEye, this->ToClip);
-  this->View.worldToEye = &this->ToEye;
-  this->View.eyeToClip = &this->ToClip;
+  halite::Renderer::Matrix toEye, toClip;
+  MatricesOf(renderer, toEye, toClip);
+  this->View.worldToEye = toEye;
+  this->View.eyeToClip = toClip;
   this->View.width = static_cast<std::uint32_t>(width);
   this->View.height = static_cast<std::uint32_t>(height);
   this->View.bottomUp = true;
   this->View.maximum = isMaximum;
-  this->Key << this->ToEye << this->ToClip << static_cast<double>(width) << static_cast<double>(height)
+  this->Key << toEye << toClip << static_cast<double>(width) << static_cast<double>(height)
             << static_cast<std::uint64_t>(isMaximum);
   for (int i = 0; planes && i < planes->GetNumberOfItems(); ++i)
   {

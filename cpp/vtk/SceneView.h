@@ -12,15 +12,11 @@ class vtkPlaneCollection;
 class vtkRenderer;
 VTK_ABI_NAMESPACE_END
 
-// Stays where it is: the core's view points into it.
 struct SceneView
 {
   halite::View View;
-  halite::Renderer::Matrix ToEye, ToClip;
   ::Key Key;
 
   // `width` x `height` rays.
   SceneView(vtkRenderer* renderer, int width, int height, bool isMaximum, vtkPlaneCollection* planes);
-  SceneView(const SceneView&) = delete;
-  void operator=(const SceneView&) = delete;
 };

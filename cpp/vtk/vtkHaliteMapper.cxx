@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 #include "vtkHaliteMapper.h"
 
+#include "FrameGuard.h"
 #include "Peeling.h"
 #include "vtkHaliteMapperInternals.h"
 
 #include "vtkInformation.h"
-#include "vtkLogger.h"
 #include "vtkObjectFactory.h"
 #include "vtkOpenGLActor.h"
 #include "vtkOpenGLRenderPass.h"
@@ -17,30 +17,12 @@
 #include "vtkVolumeProperty.h"
 
 #include <cmath>
-#include <mutex>
+#include <stdexcept>
 
 VTK_ABI_NAMESPACE_BEGIN
 
 namespace
 {
-
-// The core's log goes where VTK's does.
-void ForwardLog()
-{
-  static std::once_flag once;
-  std::call_once(once, [] {
-    halite::setLog([](halite::Level level, const std::string& line) {
-      if (level == halite::Level::Info)
-      {
-        vtkLog(TRACE, << "Halite: " << line);
-      }
-      else
-      {
-        vtkGenericWarningMacro("Halite: " << line);
-      }
-    });
-  });
-}
 
 // Whether depth peeling draws the volume now, in peels.
 bool IsPeeled(vtkVolume* volume)
@@ -85,15 +67,33 @@ bool vtkHaliteMapper::IsSupported(vtkRenderWindow* window)
 void vtkHaliteMapper::Render(vtkRenderer* renderer, vtkVolume* volume)
 {
   Internals& inner = *this->Inner;
+  // From here on observers may take away all of these.
+  const vtkSmartPointer<vtkHaliteMapper> self(this);
+  const vtkSmartPointer<vtkRenderer> keptRenderer(renderer);
+  const vtkSmartPointer<vtkVolume> keptVolume(volume);
+  if (inner.IsAtWork)
+  {
+    inner.Remark("this mapper is drawing a frame, and leaves out the one that an observer of that asks for: draw when the "
+                 "first is over, or give the other window a mapper of its own");
+    return;
+  }
+  const Internals::Turn turn(inner, renderer->GetVTKWindow());
   this->PrepareTime = this->DepthTime = this->CoreTime = this->PresentTime = 0;
   this->TimeToDraw = 0;
 
-  auto window = vtkOpenGLRenderWindow::SafeDownCast(renderer->GetVTKWindow());
+  const vtkSmartPointer<vtkOpenGLRenderWindow> window = vtkOpenGLRenderWindow::SafeDownCast(renderer->GetVTKWindow());
   if (!window)
   {
     inner.Say("Halite draws in OpenGL windows only, and this is none");
     return;
   }
+  FrameGuard::Keep(window, renderer, volume, this);
+  inner.DrawIn(window, renderer, volume);
+  FrameGuard::GiveBack(window, volume, this);
+}
+
+void vtkHaliteMapper::Internals::DrawIn(vtkOpenGLRenderWindow* window, vtkRenderer* renderer, vtkVolume* volume)
+{
   // A volume has no cell or point to be picked.
   if (renderer->GetSelector())
   {
@@ -101,74 +101,85 @@ void vtkHaliteMapper::Render(vtkRenderer* renderer, vtkVolume* volume)
   }
   // Depth peeling asks for parts of rays, in peels. A maximum has no parts, so its picture goes over the finished
   // scene, once.
-  const bool isMaximum = this->GetBlendMode() == vtkUnstructuredGridVolumeMapper::MAXIMUM_INTENSITY_BLEND;
+  const bool isMaximum = this->Self.GetBlendMode() == vtkUnstructuredGridVolumeMapper::MAXIMUM_INTENSITY_BLEND;
   vtkOpenGLRenderPass* pass = nullptr;
-  if (!inner.DrawsLate && IsPeeled(volume))
+  if (!this->DrawsLate && IsPeeled(volume))
   {
-    pass = isMaximum ? nullptr : Peeling::PassOf(this, volume);
+    pass = isMaximum ? nullptr : Peeling::PassOf(&this->Self, volume);
     if (!pass)
     {
-      inner.Remark("Halite draws this volume over translucent geometry, not between its layers");
-      inner.PutOff(renderer, volume);
+      this->Remark("Halite draws this volume over translucent geometry, not between its layers");
+      this->PutOff(renderer, volume);
       return;
     }
   }
-  auto grid = vtkUnstructuredGridBase::SafeDownCast(this->GetInputDataObject(0, 0));
+  const vtkSmartPointer<vtkUnstructuredGridBase> grid =
+    vtkUnstructuredGridBase::SafeDownCast(this->Self.GetInputDataObject(0, 0));
   if (!grid || !volume->GetProperty())
   {
-    inner.Say("there is no unstructured grid to draw: SetInputData or SetInputConnection gives the mapper one");
+    this->Say("there is no unstructured grid to draw: SetInputData or SetInputConnection gives the mapper one");
     return;
   }
   if (grid->GetNumberOfCells() == 0)
   {
     return;
   }
-  Viewport viewport;
-  renderer->GetTiledSizeAndOrigin(&viewport.Width, &viewport.Height, &viewport.X, &viewport.Y);
+  const Viewport viewport = Presenter::ViewportOf(window, renderer, renderer->GetPass() && !this->DrawsLate);
   if (viewport.Width <= 0 || viewport.Height <= 0)
   {
     return;
   }
-  inner.RemarkOn(volume->GetProperty());
+  this->RemarkOn(volume->GetProperty());
 
-  ForwardLog();
-  Internals::Clock clock(this->TimeToDraw);
+  Clock clock(this->Self.TimeToDraw);
   Key wanted;
   try
   {
-    const Content content = inner.Choose(grid, volume);
+    if (!Presenter::HasContext(window))
+    {
+      throw std::runtime_error("the window has no OpenGL context: Render() of the window makes one");
+    }
+    const Content content = this->Choose(grid, volume);
     // Where surfaces end rays there is nothing between two pixels.
-    const double distance = pass ? 1 : this->ImageSampleDistance;
+    const double distance = pass ? 1 : this->Self.ImageSampleDistance;
     SceneView view(renderer, static_cast<int>(std::ceil(viewport.Width / distance)),
-      static_cast<int>(std::ceil(viewport.Height / distance)), isMaximum, this->ClippingPlanes);
+      static_cast<int>(std::ceil(viewport.Height / distance)), isMaximum, this->Self.ClippingPlanes);
     wanted << content.Whole() << view.Key;
-    if (inner.Failed == wanted)
+    if (this->Failed == wanted)
     {
       return;
     }
-    Internals::Frame& frame = inner.FrameOf(renderer, volume);
+    Frame& frame = this->FrameOf(renderer, volume);
     if (frame.Pictured != wanted)
     {
       frame.Texture = nullptr;
       frame.Layers.Clear();
       frame.Pictured = wanted;
     }
-    Presenter& presenter = inner.PresenterOf(window);
-    if (pass ? inner.Peel(content, view, presenter, frame, pass)
-             : inner.Show(content, view, viewport, presenter, frame))
+    Presenter& presenter = this->PresenterOf(window);
+    if (pass ? this->Peel(content, view, presenter, frame, pass)
+             : this->Show(content, view, viewport, presenter, frame))
     {
-      inner.Errors.clear();
+      this->Errors.clear();
+      this->Failed = Key();
     }
+  }
+  catch (const halite::Error& error)
+  {
+    this->Failed = wanted;
+    this->Warn();
+    this->Say(error.what());
   }
   catch (const std::exception& error)
   {
-    inner.Failed = wanted;
-    inner.Say(error.what());
+    // Of the window, which may be another one next time, or able to.
+    this->Say(error.what());
   }
 }
 
 void vtkHaliteMapper::DrawLate(vtkObject* caller, unsigned long, void*)
 {
+  const vtkSmartPointer<vtkHaliteMapper> self(this);
   Internals& inner = *this->Inner;
   std::list<Internals::Late> due;
   for (auto late = inner.Lates.begin(); late != inner.Lates.end();)
@@ -180,6 +191,7 @@ void vtkHaliteMapper::DrawLate(vtkObject* caller, unsigned long, void*)
     }
     late = next;
   }
+  const bool drewLate = inner.DrawsLate;
   inner.DrawsLate = true;
   for (const Internals::Late& late : due)
   {
@@ -192,15 +204,12 @@ void vtkHaliteMapper::DrawLate(vtkObject* caller, unsigned long, void*)
       }
     }
   }
-  inner.DrawsLate = false;
+  inner.DrawsLate = drewLate;
 }
 
 void vtkHaliteMapper::ReleaseGraphicsResources(vtkWindow* window)
 {
-  // Where a renderer comes to a window VTK releases what is of no window: that is nothing of ours.
-  this->Inner->Frames.remove_if(
-    [&](const Internals::Frame& f) { return !f.Renderer || f.Renderer->GetVTKWindow() == window; });
-  this->Inner->Presenters.remove_if([&](const Presenter& p) { return !p.GetWindow() || p.GetWindow() == window; });
+  this->Inner->Release(window);
   this->Superclass::ReleaseGraphicsResources(window);
 }
 

@@ -20,18 +20,51 @@ VTK_ABI_NAMESPACE_BEGIN
 
 void vtkHaliteMapper::Internals::Say(const std::string& what)
 {
-  if (this->Errors.insert(what).second)
+  if (this->Errors.insert(Messages::WithoutNumbers(what)).second)
   {
     vtkErrorWithObjectMacro(&this->Self, << what);
   }
 }
 
-void vtkHaliteMapper::Internals::Remark(const char* what)
+void vtkHaliteMapper::Internals::Remark(const std::string& what)
 {
   if (this->Remarks.insert(what).second)
   {
     vtkWarningWithObjectMacro(&this->Self, << what);
   }
+}
+
+void vtkHaliteMapper::Internals::Warn()
+{
+  for (const std::string& warning : this->Core.TakeWarnings())
+  {
+    vtkWarningWithObjectMacro(&this->Self, << warning);
+  }
+}
+
+void vtkHaliteMapper::Internals::Release(vtkWindow* window)
+{
+  const auto take = [this](auto& from, auto& to, auto isOld) {
+    for (auto at = from.begin(); at != from.end();)
+    {
+      const auto next = std::next(at);
+      if (isOld(*at))
+      {
+        to.splice(to.end(), from, at);
+      }
+      at = next;
+    }
+    if (!this->IsAtWork)
+    {
+      to.clear();
+    }
+  };
+  this->IsReleased |= window == this->Target;
+  // Where a renderer comes to a window VTK releases what is of no window: that is nothing of ours.
+  take(this->Frames, this->OldFrames,
+    [&](const Frame& f) { return !f.Renderer || f.Renderer->GetVTKWindow() == window; });
+  take(this->Presenters, this->OldPresenters,
+    [&](const Presenter& p) { return !p.GetWindow() || p.GetWindow() == window; });
 }
 
 Presenter& vtkHaliteMapper::Internals::PresenterOf(vtkOpenGLRenderWindow* window)
@@ -81,6 +114,12 @@ void vtkHaliteMapper::Internals::RemarkOn(vtkVolumeProperty* property)
   {
     this->Remark("Halite does not draw gradient opacity");
   }
+  const int blend = this->Self.GetBlendMode();
+  if (blend != COMPOSITE_BLEND && blend != MAXIMUM_INTENSITY_BLEND)
+  {
+    this->Remark("Halite does not draw blend mode " + std::to_string(blend) +
+      " (it has composite and maximum intensity); composite is used");
+  }
 }
 
 Content vtkHaliteMapper::Internals::Choose(vtkUnstructuredGridBase* grid, vtkVolume* volume)
@@ -114,14 +153,40 @@ bool vtkHaliteMapper::Internals::Draw(
     Clock clock(this->Self.PrepareTime);
     this->Core.Hold(content);
   }
-  Clock clock(this->Self.CoreTime);
-  const bool finished = this->Core.Draw(view, pixels, [&](double share) {
-    this->Self.InvokeEvent(vtkCommand::VolumeMapperRenderProgressEvent, &share);
-    return !window->CheckAbortStatus();
-  });
-  // Handlers of events may have drawn elsewhere.
-  window->MakeCurrent();
-  return finished;
+  std::string thrown;
+  bool finished;
+  {
+    Clock clock(this->Self.CoreTime);
+    finished = this->Core.Draw(view, pixels, [&](double share) {
+      // What observers throw stays here: VTK's windows never draw again if an exception leaves a frame.
+      try
+      {
+        this->Self.InvokeEvent(vtkCommand::VolumeMapperRenderProgressEvent, &share);
+        return !window->CheckAbortStatus();
+      }
+      catch (const std::exception& error)
+      {
+        thrown = std::string("an observer of the frame threw: ") + error.what();
+      }
+      catch (...)
+      {
+        thrown = "an observer of the frame threw something that is no std::exception";
+      }
+      return false;
+    });
+  }
+  if (!thrown.empty())
+  {
+    this->Say(thrown);
+  }
+  this->Warn();
+  // Observers may have drawn elsewhere, or finalized the window: VTK goes on with its frame, and needs what that began with.
+  if (!Presenter::HasContext(window))
+  {
+    window->Start();
+    this->IsReleased = true;
+  }
+  return finished && !this->IsReleased;
 }
 
 bool vtkHaliteMapper::Internals::Show(
@@ -131,7 +196,7 @@ bool vtkHaliteMapper::Internals::Show(
   const int width = static_cast<int>(view.View.width), height = static_cast<int>(view.View.height);
   std::vector<float> depths;
   // Where nothing was drawn and nothing kept, nothing ends rays.
-  if (renderer->GetNumberOfPropsRendered() > 0 || renderer->GetPreserveDepthBuffer() || !renderer->GetErase())
+  if (viewport.IsOfPass || renderer->GetNumberOfPropsRendered() > 0 || renderer->GetPreserveDepthBuffer() || !renderer->GetErase())
   {
     Clock clock(this->Self.DepthTime);
     Presenter::ReadDepths(presenter.GetWindow(), viewport, width, height, depths);
@@ -146,7 +211,7 @@ bool vtkHaliteMapper::Internals::Show(
     frame.Texture = nullptr;
     frame.Layers.Clear();
     frame.Depths.swap(depths);
-    view.View.depths = frame.Depths.empty() ? nullptr : frame.Depths.data();
+    view.View.depths = frame.Depths;
     if (!this->Draw(content, view.View, presenter.GetWindow(), this->Pixels))
     {
       return false;
@@ -180,7 +245,7 @@ bool vtkHaliteMapper::Internals::Peel(
     frame.Layers.DropUnused();
   }
   const bool isComplete = frame.Layers.Complete(parts, [&](const std::vector<float>& ends, std::vector<float>& pixels) {
-    view.View.depths = ends.data();
+    view.View.depths = ends;
     return this->Draw(content, view.View, presenter.GetWindow(), pixels);
   });
   if (!isComplete)
@@ -188,20 +253,18 @@ bool vtkHaliteMapper::Internals::Peel(
     return false;
   }
   Clock clock(this->Self.PresentTime);
+  const bool isAlone = volume->GetMapper() == &this->Self && renderer->GetVolumes()->GetNumberOfItems() == 1;
   std::vector<float> kept, front = frame.Layers.PictureOf(parts, &Parts::Front);
   const std::vector<float> back = frame.Layers.PictureOf(parts, &Parts::Back);
   kept.swap(frame.Kept);
-  // VTK's layers have 8 bits, and what is written less often is rounded less often. Other volumes would have to go
-  // between.
-  if (isOutside && volume->GetMapper() == &this->Self && renderer->GetVolumes()->GetNumberOfItems() == 1 &&
-    renderer->GetMaximumNumberOfPeels() > 0)
+  if (isOutside && isAlone && renderer->GetMaximumNumberOfPeels() > 0)
   {
     frame.Kept.swap(front);
   }
   const auto textureOf = [&](const std::vector<float>& pixels) {
     return pixels.empty() ? presenter.Upload(1, 1, { 0, 0, 0, 0 }) : presenter.Upload(width, height, pixels);
   };
-  peeling.Answer(pass, &this->Self, volume, textureOf(kept), textureOf(front), textureOf(back));
+  peeling.Answer(pass, &this->Self, volume, isAlone, textureOf(kept), textureOf(front), textureOf(back));
   return true;
 }
 

@@ -26,9 +26,9 @@ VTK_ABI_NAMESPACE_BEGIN
 class vtkOpenGLRenderPass;
 class vtkOpenGLRenderWindow;
 class vtkRenderer;
-class vtkUnstructuredGridBase;
 class vtkVolume;
 class vtkVolumeProperty;
+class vtkWindow;
 
 struct vtkHaliteMapper::Internals
 {
@@ -77,7 +77,7 @@ struct vtkHaliteMapper::Internals
   Functions::Cache Knots;
   std::list<Frame> Frames;
   std::list<Presenter> Presenters;
-  // What failed since something was drawn, and for what: nothing is tried, or said, twice.
+  // What of the content failed since something was drawn, and what for: nothing of that is tried, and nothing is said, twice.
   Key Failed;
   std::set<std::string> Errors;
   std::set<std::string> Remarks;
@@ -85,23 +85,59 @@ struct vtkHaliteMapper::Internals
   std::string Adapter;
   std::list<Late> Lates;
   bool DrawsLate = false;
+  // A frame that is at work, in which observers may do anything: whether what it draws to was released since it began, and
+  // what was released, which goes when it is over.
+  bool IsAtWork = false;
+  vtkWindow* Target = nullptr;
+  bool IsReleased = false;
+  std::list<Frame> OldFrames;
+  std::list<Presenter> OldPresenters;
+
+  // Makes a frame the one that is at work; ends with it.
+  class Turn
+  {
+  public:
+    Turn(Internals& self, vtkWindow* target)
+      : Self(self)
+    {
+      self.IsAtWork = true;
+      self.Target = target;
+      self.IsReleased = false;
+    }
+    ~Turn()
+    {
+      this->Self.OldFrames.clear();
+      this->Self.OldPresenters.clear();
+      this->Self.IsAtWork = false;
+    }
+
+  private:
+    Internals& Self;
+  };
 
   explicit Internals(vtkHaliteMapper& self)
     : Self(self)
   {
   }
 
-  // An error or a warning, each once.
+  // An error, once until something is drawn; a warning of the mapper's own, once.
   void Say(const std::string& what);
-  void Remark(const char* what);
+  void Remark(const std::string& what);
+  // Warnings of the core.
+  void Warn();
   // What of the property is not drawn.
   void RemarkOn(vtkVolumeProperty* property);
 
   Presenter& PresenterOf(vtkOpenGLRenderWindow* window);
   Frame& FrameOf(vtkRenderer* renderer, vtkVolume* volume);
+  // Lets go what was made for a window: at once, or when the frame that is at work is over.
+  void Release(vtkWindow* window);
   Content Choose(vtkUnstructuredGridBase* grid, vtkVolume* volume);
   // Draws once the renderer has finished.
   void PutOff(vtkRenderer* renderer, vtkVolume* volume);
+
+  // Draws a volume in a window, or says what is in the way.
+  void DrawIn(vtkOpenGLRenderWindow* window, vtkRenderer* renderer, vtkVolume* volume);
 
   // These are false if what they draw was given up. By the core:
   bool Draw(const Content& content, const halite::View& view, vtkOpenGLRenderWindow* window, std::vector<float>& pixels);

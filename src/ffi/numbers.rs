@@ -1,0 +1,81 @@
+//! Numbers of a type that is known only when the program runs, as Rust's.
+
+use super::bridge::{Numbers, Type};
+use crate::error::{Error, Result};
+use crate::mesh::{Values, with_values};
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// The numbers of a slice that is known to hold some type.
+pub(super) fn cast<'a, T: bytemuck::Pod>(numbers: &Numbers<'a>) -> Result<&'a [T]> {
+    if numbers.bytes.is_empty() {
+        return Ok(&[]);
+    }
+    bytemuck::try_cast_slice(numbers.bytes)
+        .map_err(|e| Error::Mesh(format!("numbers that are not where they may be: {e}")))
+}
+
+/// Bytes of one number.
+fn size_of(kind: Type) -> usize {
+    match kind {
+        Type::I8 | Type::U8 => 1,
+        Type::I16 | Type::U16 => 2,
+        Type::I32 | Type::U32 | Type::F32 => 4,
+        _ => 8,
+    }
+}
+
+/// A copy of numbers.
+pub(super) fn values(numbers: &Numbers) -> Result<Values> {
+    Ok(match numbers.kind {
+        Type::I8 => Values::I8(cast(numbers)?.to_vec()),
+        Type::U8 => Values::U8(cast(numbers)?.to_vec()),
+        Type::I16 => Values::I16(cast(numbers)?.to_vec()),
+        Type::U16 => Values::U16(cast(numbers)?.to_vec()),
+        Type::I32 => Values::I32(cast(numbers)?.to_vec()),
+        Type::U32 => Values::U32(cast(numbers)?.to_vec()),
+        Type::I64 => Values::I64(cast(numbers)?.to_vec()),
+        Type::U64 => Values::U64(cast(numbers)?.to_vec()),
+        Type::F32 => Values::F32(cast(numbers)?.to_vec()),
+        _ => Values::F64(cast(numbers)?.to_vec()),
+    })
+}
+
+/// Points, of coordinates of any type.
+#[allow(clippy::cast_lossless, clippy::unnecessary_cast, reason = "one cast for ten types")]
+pub(super) fn triples(numbers: &Numbers) -> Result<Vec<DVec3>> {
+    let count = numbers.bytes.len() / size_of(numbers.kind);
+    if !count.is_multiple_of(3) {
+        return Err(Error::Mesh(format!("points have three coordinates each, and here are {count} numbers")));
+    }
+    match numbers.kind {
+        Type::F64 => Ok(cast::<f64>(numbers)?.as_chunks().0.par_iter().map(|&p| DVec3::from_array(p)).collect()),
+        Type::F32 => {
+            let points = cast::<f32>(numbers)?.as_chunks().0;
+            Ok(points.par_iter().map(|p: &[f32; 3]| DVec3::from_array(p.map(f64::from))).collect())
+        }
+        _ => with_values!(&values(numbers)?, v => {
+            Ok(v.as_chunks().0.iter().map(|p: &[_; 3]| DVec3::from_array(p.map(|x| x as f64))).collect())
+        }),
+    }
+}
+
+/// Integers from 0 on.
+pub(super) fn indices(what: &str, numbers: Numbers) -> Result<Vec<u64>> {
+    let negative = || Error::Mesh(format!("{what} are negative, or no integers"));
+    match numbers.kind {
+        Type::I32 => cast::<i32>(&numbers)?.par_iter().map(|&i| u64::try_from(i).map_err(|_| negative())).collect(),
+        Type::I64 => cast::<i64>(&numbers)?.par_iter().map(|&i| u64::try_from(i).map_err(|_| negative())).collect(),
+        Type::U32 => Ok(cast::<u32>(&numbers)?.iter().map(|&i| u64::from(i)).collect()),
+        Type::U64 => Ok(cast::<u64>(&numbers)?.to_vec()),
+        _ => Err(negative()),
+    }
+}
+
+pub(super) fn point_ids(numbers: Numbers) -> Result<Vec<u32>> {
+    let narrow = |i: u64| u32::try_from(i).map_err(|_| Error::Mesh(format!("a cell names point {i}")));
+    match numbers.kind {
+        Type::U32 => Ok(cast::<u32>(&numbers)?.to_vec()),
+        _ => indices("point indices", numbers)?.into_par_iter().map(narrow).collect(),
+    }
+}
