@@ -160,8 +160,7 @@ impl Session {
         };
         tetrahedra.log();
         self.mirrored = matrix.determinant() < 0.0;
-        let points = mesh.points();
-        let moved = (matrix != DMat4::IDENTITY).then(|| self.renderer.install(|| transformed(points, matrix)));
+        let moved = (matrix != DMat4::IDENTITY).then(|| self.renderer.install(|| transformed(mesh.points(), matrix)));
         self.renderer.check_room(mesh.points().len(), &tetrahedra)?;
         match moved {
             None => self.renderer.set_mesh(mesh, tetrahedra),

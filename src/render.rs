@@ -367,8 +367,7 @@ impl Renderer {
     /// [`Error::NoMemory`] if there is not.
     pub fn check_room(&self, points: usize, tetrahedra: &Tetrahedra) -> Result<()> {
         let (points, count) = (points + tetrahedra.added.len(), tetrahedra.corners.len());
-        let what = format!("{count} tetrahedra of {points} points, to find their neighbours");
-        memory::check(&what, Geometry::room(points, count))
+        memory::check(&format!("{count} tetrahedra of {points} points"), Geometry::room(points, count))
     }
 
     fn render_anyhow(&mut self, view: &View, progress: &Progress) -> Result<Image> {

@@ -313,7 +313,7 @@ impl CameraJson {
         if let Some(angle) = self.view_angle.filter(|a| !(*a > 0.0 && *a < 180.0)) {
             return Err(format!("camera.view_angle: {angle} degrees are not between 0 and 180"));
         }
-        if let Some(scale) = self.parallel_scale.filter(|s| !(*s > 0.0)) {
+        if let Some(scale) = self.parallel_scale.filter(|s| *s <= 0.0) {
             return Err(format!("camera.parallel_scale: {scale} is no half height of a view, which is above 0"));
         }
         let projection = match (&self.projection, self.view_angle, self.parallel_scale) {
