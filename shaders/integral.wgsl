@@ -24,13 +24,16 @@ struct Function {
 /// colour.
 @group(0) @binding(2) var<storage, read> buckets: array<u32>;
 
-/// One linear value along a segment, and the interval of its function that it is in.
+/// One linear value along a segment, the interval of its function that it is in, and how far it has come: whether this is
+/// one of the segment's ends or a knot, and not computed.
 struct Track {
     first: u32,
     last: u32,
     i: u32,
     front: f32,
     rise: f32,
+    at: f32,
+    known: bool,
 }
 
 /// Iterations of loops so far, at least; each loop counts once more when it ends.
@@ -137,7 +140,13 @@ fn track(first: u32, last: u32, bucket: u32, front: f32, back: f32) -> Track {
             i--;
         }
     }
-    return Track(first, last, i, front, rise);
+    return Track(first, last, i, front, rise, front, true);
+}
+
+/// The knot that the value moves to.
+fn ahead_of(t: Track) -> f32 {
+    let ends = knots[t.i].ends;
+    return select(ends.x, ends.y, t.rise > 0.0);
 }
 
 /// Where in [0, 1] the value leaves the interval; above 1 if it does not.
@@ -145,15 +154,21 @@ fn end_of(t: Track) -> f32 {
     if t.rise == 0.0 {
         return 2.0;
     }
-    let ends = knots[t.i].ends;
-    return (select(ends.x, ends.y, t.rise > 0.0) - t.front) / t.rise;
+    return (ahead_of(t) - t.front) / t.rise;
 }
 
-/// The function's value at `u`, by the line of the interval.
-fn value_at(t: Track, u: f32) -> vec4f {
+/// The value at `u`, which is not beyond `end`.
+fn value_at(t: Track, u: f32, end: f32, back: f32) -> f32 {
+    if u >= 1.0 {
+        return back;
+    }
     let ends = knots[t.i].ends;
-    let offset = clamp(t.front + t.rise * u, ends.x, ends.y) - ends.x;
-    return knots[t.i].value + knots[t.i].slope * offset;
+    return select(clamp(t.front + t.rise * u, ends.x, ends.y), ahead_of(t), end <= u);
+}
+
+/// The function at `s`, by the line of the interval.
+fn line_of(t: Track, s: f32) -> vec4f {
+    return knots[t.i].value + knots[t.i].slope * (s - knots[t.i].ends.x);
 }
 
 /// Whether there is an interval beyond that of `t`.
@@ -175,44 +190,83 @@ fn add_piece(f: vec4f, b: vec4f, l: f32) {
     light = vec4f(light.xyz + emitted * (f.yzw * p.y + b.yzw * p.z), light.w * (1.0 - p.x));
 }
 
-/// Adds a segment of `length` whose field is `front` where the ray enters and `back` where it leaves.
+/// Adds a segment of `length` whose field is `front` where the ray enters and `back` where it leaves. Pieces are measured by
+/// values, not by shares of the segment: see `Track` in src/integral/knots.rs.
 fn add_segment(front: Value, back: Value, length: f32) {
-    var opacity = track(function.opacity, select(function.end, function.color, PAIR), 0u, last_of(front), last_of(back));
-    var color = opacity;
     if PAIR {
-        color = track(function.color, function.end, BUCKETS, first_of(front), first_of(back));
+        add_pair(front, back, length);
+        return;
     }
+    var t = track(function.opacity, function.end, 0u, last_of(front), last_of(back));
+    let stop = last_of(back);
+    loop {
+        let ahead = ahead_of(t);
+        let is_last = select(t.rise == 0.0 || ahead <= stop, ahead >= stop, t.rise > 0.0);
+        let to = select(ahead, stop, is_last);
+        var share = 1.0;
+        if t.rise != 0.0 {
+            share = (to - t.at) / t.rise;
+        }
+        if share > 0.0 {
+            var f = line_of(t, t.at);
+            var b = line_of(t, to);
+            if RGBA {
+                var u = vec2f(0.0, 1.0);
+                if t.rise != 0.0 {
+                    u = (vec2f(t.at, to) - t.front) / t.rise;
+                }
+                let rise = color_of(back) - color_of(front);
+                f = vec4f(f.x, (color_of(front) + rise * u.x) * function.scale);
+                b = vec4f(b.x, (color_of(front) + rise * u.y) * function.scale);
+            }
+            add_piece(f, b, share * length);
+        }
+        work++;
+        if is_last || light.w <= 0.0 || work > most_work() || !has_next(t) {
+            return;
+        }
+        t.at = to;
+        t.i = next_of(t);
+    }
+}
+
+/// The same where two values are on functions of their own.
+fn add_pair(front: Value, back: Value, length: f32) {
+    var opacity = track(function.opacity, function.color, 0u, last_of(front), last_of(back));
+    var color = track(function.color, function.end, BUCKETS, first_of(front), first_of(back));
     var u = 0.0;
     loop {
         let opacity_end = end_of(opacity);
-        var color_end = 2.0;
-        if PAIR {
-            color_end = end_of(color);
-        }
+        let color_end = end_of(color);
         let next = max(min(min(opacity_end, color_end), 1.0), u);
-        var f = value_at(opacity, u);
-        var b = value_at(opacity, next);
-        if PAIR {
-            f = vec4f(f.x, value_at(color, u).yzw);
-            b = vec4f(b.x, value_at(color, next).yzw);
+        let opacity_to = value_at(opacity, next, opacity_end, last_of(back));
+        let color_to = value_at(color, next, color_end, first_of(back));
+        let opacity_known = next >= 1.0 || opacity_end <= next;
+        let color_known = next >= 1.0 || color_end <= next;
+        var share = next - u;
+        if opacity.known && opacity_known && opacity.rise != 0.0 {
+            share = (opacity_to - opacity.at) / opacity.rise;
+        } else if color.known && color_known && color.rise != 0.0 {
+            share = (color_to - color.at) / color.rise;
         }
-        if RGBA {
-            let rise = color_of(back) - color_of(front);
-            f = vec4f(f.x, (color_of(front) + rise * u) * function.scale);
-            b = vec4f(b.x, (color_of(front) + rise * next) * function.scale);
-        }
-        add_piece(f, b, (next - u) * length);
+        let f = vec4f(line_of(opacity, opacity.at).x, line_of(color, color.at).yzw);
+        let b = vec4f(line_of(opacity, opacity_to).x, line_of(color, color_to).yzw);
+        add_piece(f, b, share * length);
         work++;
         if next >= 1.0 || light.w <= 0.0 || work > most_work() {
             return;
         }
+        opacity.at = opacity_to;
+        opacity.known = opacity_known;
+        color.at = color_to;
+        color.known = color_known;
         if opacity_end <= next {
             if !has_next(opacity) {
                 return;
             }
             opacity.i = next_of(opacity);
         }
-        if PAIR && color_end <= next {
+        if color_end <= next {
             if !has_next(color) {
                 return;
             }

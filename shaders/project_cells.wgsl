@@ -57,7 +57,7 @@ fn values_of(cell: u32, corners: vec4u) -> array<Value, 4> {
 
 /// The end of a bin below `s`, one further than needed: rounding.
 fn end_below(s: f32) -> i32 {
-    return clamp(i32((s + 1.0) * (f32(BINS) / 2.0)) - 1, 0, i32(BINS) - 1);
+    return max(i32(clamp((s + 1.0) * (f32(BINS) / 2.0), 0.0, f32(BINS))) - 1, 0);
 }
 
 /// Whether the function shows anything of a cell whose values are between two.
@@ -70,7 +70,7 @@ fn line_at(low: f32, high: f32) -> u32 {
     var i = bins[end_below(low)].y;
     var ends = ends_of(i);
     loop {
-        // No value is above 1, but this ends whatever is one.
+        // No knot is above 1, but this ends whatever is one.
         if ends.y > min(low, 2.0) {
             break;
         }
@@ -78,14 +78,6 @@ fn line_at(low: f32, high: f32) -> u32 {
         ends = ends_of(i);
     }
     return select(i, u32(ends.z), low == high && low == ends.x && ends.z != 0.0);
-}
-
-/// The centre of the sphere through the corners, from the first of them; not finite for flat cells.
-fn circumcentre(p: array<vec3f, 4>) -> vec3f {
-    let b = p[1] - p[0];
-    let c = p[2] - p[0];
-    let d = p[3] - p[0];
-    return (dot(b, b) * cross(c, d) + dot(c, c) * cross(d, b) + dot(d, d) * cross(b, c)) / (2.0 * dot(b, cross(c, d)));
 }
 
 /// A key that falls as the depth rises; HIDDEN if nothing of the cell is seen. As `keys.rs` finds them on the host.
@@ -130,21 +122,11 @@ fn key_of(cell: u32) -> u32 {
             return HIDDEN;
         }
     }
-    // Of the squared distance from the eye, with a sphere's radius taken away; its digits are kept where the eye is
-    // far.
-    var middle = (p[0] + p[1] + p[2] + p[3]) * 0.25;
-    var radius = 0.0;
-    if BY_SPHERE {
-        let centre = circumcentre(p);
-        let square = dot(centre, centre);
-        if square < FAR {
-            middle = p[0] + centre;
-            radius = square;
-        }
-    }
+    // Of the squared distance from the eye; its digits are kept where the eye is far.
+    let middle = (p[0] + p[1] + p[2] + p[3]) * 0.25;
     var depth = dot(middle, frame.forward.xyz);
     if PERSPECTIVE {
-        depth = (dot(middle, middle) - radius + 2.0 * frame.forward.w * depth) / max(2.0 * frame.forward.w, 1.0);
+        depth = (dot(middle, middle) + 2.0 * frame.forward.w * depth) / max(2.0 * frame.forward.w, 1.0);
     }
     let bits = bitcast<u32>(depth);
     let ascending = select(bits | 0x80000000u, ~bits, (bits >> 31u) == 1u);

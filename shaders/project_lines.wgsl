@@ -11,7 +11,7 @@ struct Line {
     ends: vec2f,
 }
 
-fn line_of(i: u32) -> Line {
+fn line_at_number(i: u32) -> Line {
     let at = vec2u(i % LINES_ACROSS, 3u * (i / LINES_ACROSS));
     return Line(textureLoad(lines, at), textureLoad(lines, at + vec2u(0u, 1u)), ends_of(i).xy);
 }
@@ -25,29 +25,33 @@ fn ends_of(i: u32) -> vec4f {
 const FLAT = 1e-30;
 
 /// Premultiplied colour and opacity of a segment, by lines that are looked up one by one from the least value upward,
-/// which is on the line `first` or above it.
+/// which is on the line `first` or above it. Pieces are measured by values.
 fn by_lookups(front: Value, back: Value, length: f32, first: u32) -> vec4f {
     let low = min(last_of(front), last_of(back));
+    let high = max(last_of(front), last_of(back));
     let rises = last_of(front) <= last_of(back);
-    let range = abs(last_of(back) - last_of(front));
-    let share = 1.0 / max(range, FLAT);
+    let range = high - low;
+    let share = 1.0 / select(range, 1.0, range == 0.0);
     var sum = vec4f(0.0, 0.0, 0.0, 1.0);
     var i = first;
-    var u = 0.0;
+    var start = low;
     loop {
-        let line = line_of(i);
-        let is_last = low + range < line.ends.y;
-        let next = select(clamp((line.ends.y - low) * share, u, 1.0), 1.0, is_last);
-        let a = line.value + line.slope * (clamp(low + range * u, line.ends.x, line.ends.y) - line.ends.x);
-        let b = line.value + line.slope * (clamp(low + range * next, line.ends.x, line.ends.y) - line.ends.x);
+        let line = line_at_number(i);
+        let is_last = high < line.ends.y;
+        let to = select(clamp(line.ends.y, start, high), high, is_last);
+        let part = select((to - start) * share, select(0.0, 1.0, is_last), range == 0.0);
+        let a = line.value + line.slope * (clamp(start, line.ends.x, line.ends.y) - line.ends.x);
+        let b = line.value + line.slope * (clamp(to, line.ends.x, line.ends.y) - line.ends.x);
         var f = select(b, a, rises);
         var r = select(a, b, rises);
         if RGBA {
+            let u = (start - low) * share;
+            let next = select((to - low) * share, 1.0, is_last);
             let ends = select(vec2f(1.0 - next, 1.0 - u), vec2f(u, next), rises);
             f = vec4f(f.x, mix(color_of(front), color_of(back), ends.x) * function.scale);
             r = vec4f(r.x, mix(color_of(front), color_of(back), ends.y) * function.scale);
         }
-        let l = (next - u) * length;
+        let l = part * length;
         let p = piece(f.x * l, r.x * l);
         let color = (f.yzw * p.y + r.yzw * p.z) * select(1.0, l, DIRECT);
         let through = 1.0 - p.x;
@@ -57,7 +61,7 @@ fn by_lookups(front: Value, back: Value, length: f32, first: u32) -> vec4f {
             break;
         }
         i++;
-        u = next;
+        start = to;
     }
     return vec4f(sum.xyz, 1.0 - sum.w);
 }

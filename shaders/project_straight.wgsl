@@ -26,7 +26,7 @@ fn lines_between(low: f32, high: f32, eye: f32, piece: u32) -> Lines {
     let above = parts - 1u - own;
     let part = select(select(piece - above, own, piece == parts - 1u), parts - 1u - piece, piece < above);
     i += LINES * part;
-    var line = line_of(i);
+    var line = line_at_number(i);
     let start = max(low, line.ends.x);
     var lines: Lines;
     lines.words[0] = line.value + line.slope * (start - line.ends.x);
@@ -35,14 +35,14 @@ fn lines_between(low: f32, high: f32, eye: f32, piece: u32) -> Lines {
     var begin = vec2f(FAR);
     if LINES > 1u {
         begin.x = line.ends.y - low;
-        line = line_of(i + 1u);
+        line = line_at_number(i + 1u);
         lines.words[2u % (2u * LINES)] = line.value;
         lines.words[3u % (2u * LINES)] = line.slope;
         steepest = max(steepest, extinction_between(line, low, high));
     }
     if LINES > 2u {
         begin.y = line.ends.y - low;
-        line = line_of(i + 2u);
+        line = line_at_number(i + 2u);
         lines.words[4u % (2u * LINES)] = line.value;
         lines.words[5u % (2u * LINES)] = line.slope;
         steepest = max(steepest, extinction_between(line, low, high));

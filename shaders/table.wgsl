@@ -107,8 +107,37 @@ fn around_diagonal(ends: vec2f, length: f32, a: f32) -> vec4f {
     return select(vec4f(), texel * table.span[0] + table.least[0], s > 0.0);
 }
 
-/// Premultiplied colour and opacity of a segment.
+/// How far values are in the table's range, ±1, but for rounding.
+const WITHIN = 1.000001;
+
+/// Premultiplied colour and opacity of a segment. Beyond ±1 the function is constant: that part of a segment is exact.
 fn tabulated(front: f32, back: f32, length: f32) -> vec4f {
+    if max(abs(front), abs(back)) <= WITHIN {
+        return looked_up(front, back, length);
+    }
+    let inner = clamp(vec2f(front, back), vec2f(-1.0), vec2f(1.0));
+    if inner.x == inner.y {
+        return outside(front, length);
+    }
+    let parts = vec3f(inner.x - front, inner.y - inner.x, back - inner.y) * (length / (back - front));
+    return joined(joined(outside(front, parts.x), looked_up(inner.x, inner.y, parts.y)), outside(back, parts.z));
+}
+
+/// A segment where values are beyond the table's range, on the side of `s`.
+fn outside(s: f32, length: f32) -> vec4f {
+    let value = knots[select(function.opacity, function.color - 1u, s > 0.0)].value;
+    let p = piece(value.x * length, value.x * length);
+    return vec4f(value.yzw * ((p.y + p.z) * select(1.0, length, DIRECT)), p.x);
+}
+
+/// `front` before `back`.
+fn joined(front: vec4f, back: vec4f) -> vec4f {
+    let through = 1.0 - front.w;
+    return vec4f(front.xyz + through * back.xyz, 1.0 - through * (1.0 - back.w));
+}
+
+/// A segment of values within ±1.
+fn looked_up(front: f32, back: f32, length: f32) -> vec4f {
     let ends = clamp(vec2f(front, back) * 0.5 + 0.5, vec2f(0.0), vec2f(1.0));
     if COLORING == POLYNOMIAL {
         return by_polynomials(ends, length);

@@ -393,8 +393,12 @@ fn of_corner(own: array<Value, 4>, ids: vec4u, id: u32) -> Value {
 }
 
 fn interpolated(corners: Corners, weights: vec3f) -> Value {
-    // Differences to one corner, which are small: weights that are off by 1e-7 must not shift a value by as much.
-    let v = corners.a + ((corners.b - corners.a) * weights.y + (corners.c - corners.a) * weights.z);
+    // Differences to one corner, which are small: weights that are off by 1e-7 must not shift a value by as much. It is that
+    // of the least size: those that function and values are about are near 0, and differences to an outlier lose them.
+    let b_is_least = abs(last_of(corners.b)) < abs(last_of(corners.a)) && abs(last_of(corners.b)) <= abs(last_of(corners.c));
+    let c_is_least = abs(last_of(corners.c)) < abs(last_of(corners.a)) && abs(last_of(corners.c)) < abs(last_of(corners.b));
+    let base = select(select(corners.a, corners.b, b_is_least), corners.c, c_is_least);
+    let v = base + (((corners.a - base) * weights.x + (corners.b - base) * weights.y) + (corners.c - base) * weights.z);
     let seen = is_visible(corners.a) && is_visible(corners.b) && is_visible(corners.c);
     return select(Value(INVISIBLE), v, seen);
 }

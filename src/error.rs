@@ -68,6 +68,9 @@ pub enum Error {
         /// Bytes that may be.
         allowed: u64,
     },
+    /// The system has not enough memory.
+    #[error("{0}")]
+    NoMemory(String),
     /// A device is gone: unplugged, reset, or its driver failed.
     #[error("{0}")]
     Lost(String),

@@ -1,8 +1,16 @@
 //! The field that is drawn: one array of a mesh, reduced to a scalar, a (colour, opacity) pair or RGBA.
 
+pub(crate) mod normal;
+
 use crate::error::{Error, Result};
 use crate::mesh::{Array, Mesh, with_values};
+pub use normal::Normal;
 use rayon::prelude::*;
+use std::borrow::Cow;
+use std::sync::Arc;
+
+/// Values of a sample.
+const SAMPLES: usize = 1 << 12;
 
 /// Whether values belong to points (and vary linearly inside a tetrahedron) or to cells (and are constant inside).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,42 +54,21 @@ impl Kind {
     }
 }
 
-/// The affine map from a field's values to [−1, 1]: `(s − mid) / half`, computed in f64 so that nothing is lost in a
-/// field like 1e9 ± 1.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Normal {
-    /// The middle of the range of the finite values.
-    pub mid: f64,
-    /// Half of that range; where it is zero, a positive number.
-    pub half: f64,
-}
-
-impl Normal {
-    /// The map for values in `[lo, hi]`.
-    pub fn new(lo: f64, hi: f64) -> Self {
-        let (mid, half) = (lo / 2.0 + hi / 2.0, hi / 2.0 - lo / 2.0);
-        Normal { mid, half: if half > 0.0 { half } else { mid.abs().max(1.0) } }
-    }
-
-    /// `(s − mid) / half`.
-    pub fn apply(self, s: f64) -> f64 {
-        (s - self.mid) / self.half
-    }
-
-    /// `mid + half · s`.
-    pub fn invert(self, s: f64) -> f64 {
-        self.mid + self.half * s
-    }
-}
-
-/// The field that is drawn. Values are kept as [`Normal`] maps them, per component.
+/// The field that is drawn: its values in the array's own units, each as exact as f64 holds it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Field {
     association: Association,
     kind: Kind,
-    values: Vec<f32>,
+    values: Arc<Stored>,
     normal: [Normal; 4],
     range: [[f64; 2]; 4],
+}
+
+/// Values one after another, in the shortest type that holds each exactly.
+#[derive(Debug, PartialEq)]
+enum Stored {
+    Short(Vec<f32>),
+    Long(Vec<f64>),
 }
 
 impl Field {
@@ -181,13 +168,14 @@ impl Field {
             // The colour needs no function, only its own scale: bytes are 255ths, anything else is taken as it is.
             normal[..3].fill(Normal { mid: 0.0, half: T::FULL });
         }
-        let mut values = vec![0.0; tuples * m];
-        values.par_chunks_mut(m).enumerate().for_each(|(t, out)| {
-            for (k, v) in out.iter_mut().enumerate() {
-                *v = normal[k].apply(value(t, k)) as f32;
+        let at = |i: usize| value(i / m, i % m);
+        let values = match component {
+            Component::Index(_) | Component::All if T::SHORT => {
+                Stored::Short((0..tuples * m).into_par_iter().map(|i| at(i) as f32).collect())
             }
-        });
-        Ok(Field { association, kind, values, normal, range })
+            _ => Stored::Long((0..tuples * m).into_par_iter().map(at).collect()),
+        };
+        Ok(Field { association, kind, values: Arc::new(values), normal, range })
     }
 
     /// Whether the values belong to points or to cells.
@@ -200,14 +188,54 @@ impl Field {
         self.kind
     }
 
-    /// The normalised values, [`Kind::components`] for each point or cell. Not finite where the array is not.
-    pub fn values(&self) -> &[f32] {
-        &self.values
+    /// How many values there are: [`Kind::components`] for each point or cell.
+    pub fn len(&self) -> usize {
+        match &*self.values {
+            Stored::Short(v) => v.len(),
+            Stored::Long(v) => v.len(),
+        }
     }
 
-    /// The map that made the normalised values of component `k`.
+    /// Whether there is no value.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Value `i` of all, in the array's own units: component `i % n` of point or cell `i / n`, of `n` components. Not
+    /// finite where the array is not.
+    ///
+    /// # Panics
+    /// If there are not as many.
+    pub fn value(&self, i: usize) -> f64 {
+        match &*self.values {
+            Stored::Short(v) => f64::from(v[i]),
+            Stored::Long(v) => v[i],
+        }
+    }
+
+    /// All values, in the array's own units.
+    pub fn values(&self) -> Cow<'_, [f64]> {
+        match &*self.values {
+            Stored::Short(v) => v.par_iter().map(|&v| f64::from(v)).collect::<Vec<_>>().into(),
+            Stored::Long(v) => v.into(),
+        }
+    }
+
+    /// The map of all finite values of component `k` to [−1, 1]; for colours of [`Kind::Rgba`], of what is a full one to
+    /// 1.
     pub fn normal(&self, k: usize) -> Normal {
         self.normal[k]
+    }
+
+    /// Some different finite values of component `k`, ascending.
+    fn sample(&self, k: usize) -> Vec<f64> {
+        let n = self.kind.components();
+        let step = (self.len() / n).div_ceil(SAMPLES).max(1);
+        let all = (k..self.len()).step_by(n * step).map(|i| self.value(i));
+        let mut sample: Vec<f64> = all.filter(|v| v.is_finite()).collect();
+        sample.sort_by(f64::total_cmp);
+        sample.dedup();
+        sample
     }
 
     /// Smallest and largest finite value of component `k`, as the array has them.
@@ -220,14 +248,17 @@ impl Field {
 pub trait Number: Copy + Send + Sync {
     /// What a colour component at its full is in this type.
     const FULL: f64;
+    /// Whether f32 holds each such number exactly.
+    const SHORT: bool;
     /// The number as f64, rounded if it must be.
     fn to_f64(self) -> f64;
 }
 
 macro_rules! numbers {
-    ($($t:ty, $full:expr;)*) => {
+    ($($t:ty, $full:expr, $short:expr;)*) => {
         $(impl Number for $t {
             const FULL: f64 = $full;
+            const SHORT: bool = $short;
             #[allow(clippy::cast_lossless, clippy::unnecessary_cast, reason = "one cast for ten types")]
             fn to_f64(self) -> f64 {
                 self as f64
@@ -235,7 +266,10 @@ macro_rules! numbers {
         })*
     };
 }
-numbers! { i8, 1.0; u8, 255.0; i16, 1.0; u16, 1.0; i32, 1.0; u32, 1.0; i64, 1.0; u64, 1.0; f32, 1.0; f64, 1.0; }
+numbers! {
+    i8, 1.0, true; u8, 255.0, true; i16, 1.0, true; u16, 1.0, true; i32, 1.0, false; u32, 1.0, false;
+    i64, 1.0, false; u64, 1.0, false; f32, 1.0, true; f64, 1.0, false;
+}
 
 /// The length of a tuple, without overflow for components up to 1e300.
 fn magnitude<T: Number>(tuple: &[T]) -> f64 {

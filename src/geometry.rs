@@ -7,13 +7,17 @@ pub mod boundary;
 pub mod contacts;
 
 use crate::error::{Error, Result};
+use crate::field::normal::{self, Normal};
 use crate::field::{Association, Field};
 use crate::mesh::cells::Tetrahedra;
 use crate::mesh::faces::{BOUNDARY, Faces};
 use boundary::Boundary;
 use bytemuck::Zeroable;
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use rayon::prelude::*;
+
+/// Meshes that are less thick than this, of what they are wide, are too flat for f32.
+const FLATTEST: f64 = 5e-5;
 
 /// One tetrahedron as engines see it: 32 bytes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, bytemuck::Pod, Zeroable)]
@@ -112,6 +116,20 @@ impl Geometry {
         self.boundary.refit(&self.points);
     }
 
+    /// Whether the mesh is so flat, or so thin a needle, that f32 tells no lengths across it: the variance of its points
+    /// along one of their principal axes is next to nothing beside that along another.
+    pub fn is_flat(&self) -> bool {
+        let n = self.points.len().max(1) as f64;
+        let mean = self.points.par_iter().copied().reduce(|| DVec3::ZERO, |a, b| a + b) / n;
+        let product = |p: &DVec3| {
+            let d = *p - mean;
+            DMat3::from_cols(d * d.x, d * d.y, d * d.z)
+        };
+        let covariance = self.points.par_iter().map(product).reduce(|| DMat3::ZERO, |a, b| a + b) * (1.0 / n);
+        let [least, greatest] = outer_eigenvalues(covariance);
+        !self.cells.is_empty() && least < FLATTEST * FLATTEST * greatest
+    }
+
     /// The longest edge of a cell, in normalised units: no segment of a ray is longer.
     pub fn longest_edge(&self) -> f64 {
         let edges = |c: &Cell| {
@@ -122,13 +140,19 @@ impl Geometry {
         self.cells.par_iter().map(edges).reduce(|| f64::MIN_POSITIVE, f64::max).sqrt()
     }
 
+    /// Bytes that it takes at most to make one of so many points and tetrahedra, with what [`Faces::new`] needs and leaves.
+    pub(crate) fn room(points: usize, tetrahedra: usize) -> u64 {
+        120 * tetrahedra as u64 + 60 * points as u64
+    }
+
     /// Bytes that a walk reads.
     pub fn bytes(&self) -> u64 {
         (size_of_val(&*self.points) + size_of_val(&*self.cells)) as u64 + self.boundary.bytes()
     }
 }
 
-/// The values of a field with `N` components, in the order of a [`Geometry`].
+/// The values of a field with `N` components, in the order of a [`Geometry`], normalised: what the transfer function tells
+/// apart is in [−1, 1] or near it, and outliers are up to 2⁴⁰ away.
 #[derive(Debug, Clone)]
 pub enum Values<const N: usize> {
     /// One for each point.
@@ -140,7 +164,8 @@ pub enum Values<const N: usize> {
 }
 
 impl<const N: usize> Values<N> {
-    /// Brings the values of `field` into the order of `geometry`, made from `tetrahedra`.
+    /// Brings the values of `field`, as `normal` maps each component, into the order of `geometry`, made from
+    /// `tetrahedra`.
     ///
     /// # Errors
     /// [`Error::Field`] if there are not as many values as points or cells.
@@ -150,24 +175,28 @@ impl<const N: usize> Values<N> {
         points: usize,
         cells: usize,
         field: &Field,
+        normal: &[Normal; 4],
     ) -> Result<Self> {
         let (what, count) = match field.association() {
             Association::Point => ("points", points),
             Association::Cell => ("cells", cells),
         };
-        if field.values().len() != count * N {
-            return Err(Error::Field(format!("the field has {} values for {count} {what}", field.values().len() / N)));
+        if field.kind().components() != N || field.len() != count * N {
+            return Err(Error::Field(format!("the field has {} values for {count} {what}", field.len() / N)));
         }
-        let values = match field.association() {
-            Association::Point => tetrahedra.values(field.values(), N),
-            Association::Cell => field.values().into(),
-        };
-        let (values, []) = values.as_chunks::<N>() else { return Err(Error::Field("uneven field".into())) };
-        let value = |i: u32| values[i as usize];
+        let limits: [f64; N] =
+            std::array::from_fn(|k| if N == 4 && k < 3 { normal::MOST_COLOUR } else { normal::MOST });
+        let brought = |value: &dyn Fn(usize) -> f64| std::array::from_fn(|k| normal[k].bounded(value(k), limits[k]));
         if field.association() == Association::Cell {
-            let cell = |t: u32| tetrahedra.cell.as_ref().map_or(t, |c| c[t as usize]);
-            return Ok(Values::Cell(geometry.tetrahedron_of.par_iter().map(|&t| value(cell(t))).collect()));
+            let cell = |t: u32| tetrahedra.cell.as_ref().map_or(t, |c| c[t as usize]) as usize;
+            let value = |&t: &u32| brought(&|k| field.value(cell(t) * N + k));
+            return Ok(Values::Cell(geometry.tetrahedron_of.par_iter().map(value).collect()));
         }
+        let added = tetrahedra.added_values(N, |i| field.value(i));
+        let value = |i: u32| {
+            let first = i as usize * N;
+            brought(&|k| first.checked_sub(count * N).map_or_else(|| field.value(first + k), |i| added[i + k]))
+        };
         let at_points: Vec<[f32; N]> = geometry.point_of.par_iter().map(|&p| value(p)).collect();
         let own = |t: u32| tetrahedra.corners[t as usize].map(value);
         let bits = |v: [f32; N]| v.map(f32::to_bits);
@@ -189,6 +218,27 @@ impl<const N: usize> Values<N> {
             Values::Corner(v) => size_of_val(&**v) as u64,
         }
     }
+}
+
+/// The least and the greatest eigenvalue of a symmetric matrix, by Jacobi's rotations (1846).
+fn outer_eigenvalues(m: DMat3) -> [f64; 2] {
+    let mut a = m.to_cols_array_2d();
+    for (p, q) in [(0, 1), (0, 2), (1, 2)].into_iter().cycle().take(36) {
+        if a[p][q] == 0.0 {
+            continue;
+        }
+        let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
+        let t = theta.signum() / (theta.abs() + theta.hypot(1.0));
+        let c = 1.0 / t.hypot(1.0);
+        let turned = |x: f64, y: f64| (c * (x - t * y), c * (t * x + y));
+        for row in &mut a {
+            (row[p], row[q]) = turned(row[p], row[q]);
+        }
+        let turned: [(f64, f64); 3] = std::array::from_fn(|k| turned(a[p][k], a[q][k]));
+        (a[p], a[q]) = (turned.map(|t| t.0), turned.map(|t| t.1));
+    }
+    let values = [a[0][0], a[1][1], a[2][2]];
+    [values.into_iter().fold(f64::MAX, f64::min), values.into_iter().fold(f64::MIN, f64::max)]
 }
 
 /// Centre and scale that bring what lies between two corners into [−1, 1]³.

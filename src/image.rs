@@ -3,6 +3,7 @@
 pub mod npy;
 
 use crate::error::{Error, Result};
+use crate::memory;
 use ::image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use exr::prelude::{ReadChannels, ReadLayers, WritableImage};
 use std::path::Path;
@@ -69,8 +70,8 @@ impl Image {
     /// float RGBA) or `.png` (8-bit, linear as the picture is, over `backdrop`). A file is written whole or not at all.
     ///
     /// # Errors
-    /// [`Error::File`], [`Error::Unsupported`] for any other ending, or [`Error::View`] if the backdrop has another
-    /// size.
+    /// [`Error::File`], [`Error::Unsupported`] for any other ending, [`Error::NoMemory`], or [`Error::View`] if the
+    /// backdrop has another size.
     pub fn save(&self, path: &Path, backdrop: Backdrop) -> Result<()> {
         let bytes = self.encoded(path, &ending(path), backdrop)?;
         std::fs::write(path, bytes).map_err(|e| {
@@ -92,6 +93,13 @@ impl Image {
 
     fn encoded(&self, path: &Path, format: &str, backdrop: Backdrop) -> Result<Vec<u8>> {
         let [w, h] = self.size.map(|n| n as usize);
+        // Float files are encoded whole before they are written; of 8 bits there are the samples and what they pack to.
+        let each = match format {
+            "npy" => 16,
+            "exr" => 32,
+            _ => 8,
+        };
+        memory::check(&format!("a file of {w}x{h} pixels"), each * self.pixels.len() as u64)?;
         Ok(match format {
             "npy" => npy::encode(&[h, w, 4], self.pixels.as_flattened()),
             "exr" => self.exr().map_err(|e| Error::file(path, std::io::Error::other(e)))?,

@@ -29,7 +29,7 @@ pub use lookup::{Integral, Lookup};
 use crate::field::{Kind, Normal};
 use crate::real::Real;
 use crate::transfer::{Emission, TransferFunction};
-use knots::{Side, Track, compile, extinction, sample};
+use knots::{BRIGHTEST, Side, Track, compile, extinction, sample};
 
 /// Extinction that stands for "opaque", per normalised unit of length: even the thinnest slab that f32 can tell from
 /// nothing is then opaque, and its square is still finite.
@@ -211,11 +211,13 @@ impl<R: Real> Exact<R> {
     pub fn new(transfer: &TransferFunction, kind: Kind, normal: &[Normal; 4], scale: f64) -> Self {
         let direct = matches!(transfer.emission(), Emission::Direct { .. });
         let emission = match transfer.emission() {
-            Emission::Direct { scale: e } => e / scale,
+            Emission::Direct { scale: e } => (e / scale).min(BRIGHTEST),
             Emission::Chromatic => 1.0,
         };
         let last = normal[kind.components() - 1];
-        let colored = |s: f64, side: Side| sample(transfer.color(), transfer.clamp(), s, side).map(|c| c * emission);
+        let colored = |s: f64, side: Side| {
+            sample(transfer.color(), transfer.clamp(), s, side).map(|c| (c * emission).min(BRIGHTEST))
+        };
         let extinction = extinction(transfer, OPAQUE_EXTINCTION * scale);
         let mut places: Vec<f64> = extinction.iter().map(|k| k.0).collect();
         if kind == Kind::Scalar {
@@ -248,33 +250,63 @@ impl<R: Real> Exact<R> {
         if !front.iter().chain(back).all(|v| v.is_finite()) {
             return;
         }
-        let mut opacity = Track::new(&self.opacity, front[N - 1], back[N - 1]);
-        let mut color = self.color.as_ref().map(|k| Track::new(k, front[0], back[0]));
+        if let Some(color) = &self.color {
+            return self.for_each_piece_of_pair(color, front, back, piece);
+        }
+        let mut track = Track::new(&self.opacity, front[N - 1], back[N - 1]);
         let (zero, one) = (R::of(0.0), R::of(1.0));
-        let mut u = zero;
         loop {
-            let (opacity_end, color_end) = (opacity.end(), color.as_ref().map_or(R::of(2.0), Track::end));
-            let next = opacity_end.min(color_end).min(one).max(u);
-            let (mut f, mut b) = (opacity.at(u), opacity.at(next));
-            if let Some(color) = &color {
-                let ([_, fc @ ..], [_, bc @ ..]) = (color.at(u), color.at(next));
-                f[1..].copy_from_slice(&fc);
-                b[1..].copy_from_slice(&bc);
-            } else if N == 4 {
-                for k in 0..3 {
-                    let rise = back[k] - front[k];
-                    f[k + 1] = (front[k] + rise * u) * self.scale;
-                    b[k + 1] = (front[k] + rise * next) * self.scale;
+            let (to, is_last) = track.next();
+            let share = track.share_to((to, true)).unwrap_or(one);
+            if share > zero {
+                let (mut f, mut b) = (track.line(track.at), track.line(to));
+                if N == 4 {
+                    let (u, v) = (track.share_before(track.at), if is_last { one } else { track.share_before(to) });
+                    for k in 0..3 {
+                        let rise = back[k] - front[k];
+                        f[k + 1] = (front[k] + rise * u) * self.scale;
+                        b[k + 1] = (front[k] + rise * v) * self.scale;
+                    }
+                }
+                if f[0] + b[0] > zero || self.direct {
+                    piece(f, b, share);
                 }
             }
-            if f[0] + b[0] > zero || self.direct {
-                piece(f, b, next - u);
+            track.move_to((to, true));
+            if is_last || !track.advance() {
+                return;
+            }
+        }
+    }
+
+    /// The same where two values are on functions of their own.
+    #[inline(always)]
+    fn for_each_piece_of_pair<const N: usize>(
+        &self,
+        color: &Knots<R>,
+        front: &[R; N],
+        back: &[R; N],
+        mut piece: impl FnMut([R; 4], [R; 4], R),
+    ) {
+        let mut opacity = Track::new(&self.opacity, front[N - 1], back[N - 1]);
+        let mut color = Track::new(color, front[0], back[0]);
+        let (mut u, one) = (R::of(0.0), R::of(1.0));
+        loop {
+            let (opacity_end, color_end) = (opacity.end(), color.end());
+            let next = opacity_end.min(color_end).min(one).max(u);
+            let (opacity_to, color_to) = (opacity.value(next, opacity_end), color.value(next, color_end));
+            let share = opacity.share_to(opacity_to).or_else(|| color.share_to(color_to)).unwrap_or(next - u);
+            let ([x, ..], [y, ..]) = (opacity.line(opacity.at), opacity.line(opacity_to.0));
+            if x + y > R::of(0.0) || self.direct {
+                let ([_, r, g, b], [_, s, t, v]) = (color.line(color.at), color.line(color_to.0));
+                piece([x, r, g, b], [y, s, t, v], share);
             }
             if next >= one {
                 return;
             }
-            let more = (opacity_end > next || opacity.advance())
-                && color.as_mut().is_none_or(|c| color_end > next || c.advance());
+            opacity.move_to(opacity_to);
+            color.move_to(color_to);
+            let more = (opacity_end > next || opacity.advance()) && (color_end > next || color.advance());
             if !more {
                 return;
             }

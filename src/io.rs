@@ -12,11 +12,12 @@ mod vtu;
 
 use crate::error::{Error, Result};
 use crate::mesh::{LeftOut, Mesh};
+use crate::progress::Progress;
 use input::Input;
 use series::Series;
 use std::io::Read;
 use std::path::Path;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 /// What Halite knows of but does not read: extension, type attribute of the XML file, and what would help.
 const REFUSED: [(&str, &str, &str); 23] = [
@@ -246,20 +247,4 @@ fn validated(path: &Path, mesh: Result<Mesh>) -> Result<Mesh> {
         Error::Mesh(what) => Error::malformed(path, what),
         other => other,
     })
-}
-
-/// Counts the numbers that are read, and tells their share.
-struct Progress<'a> {
-    tell: &'a (dyn Fn(f64) + Sync),
-    expected: f64,
-    /// Told under the lock, so that the share never falls.
-    done: Mutex<usize>,
-}
-
-impl Progress<'_> {
-    fn add(&self, numbers: usize) {
-        let mut done = self.done.lock().unwrap_or_else(PoisonError::into_inner);
-        *done += numbers;
-        (self.tell)((*done as f64 / self.expected).min(1.0));
-    }
 }

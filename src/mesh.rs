@@ -9,6 +9,7 @@ pub use attributes::{Attributes, LeftOut, Role};
 
 use crate::error::{Error, Result};
 use glam::DVec3;
+use rayon::prelude::*;
 
 /// The values of a data array, in the type that the file or host holds them in. Tuples lie one after another.
 #[derive(Debug, Clone, PartialEq)]
@@ -269,6 +270,18 @@ impl Mesh {
         check_array("cell", &array, self.cells.len())?;
         self.cell_arrays.push(array);
         Ok(())
+    }
+
+    /// The mesh stretched about the origin, by a factor for each axis.
+    ///
+    /// # Errors
+    /// [`Error::Mesh`] if a factor is 0 or not finite.
+    pub fn scaled(mut self, by: DVec3) -> Result<Self> {
+        if !by.is_finite() || by.cmpeq(DVec3::ZERO).any() {
+            return Err(Error::Mesh(format!("it cannot be stretched by {by}")));
+        }
+        self.points.par_iter_mut().for_each(|p| *p *= by);
+        Ok(self)
     }
 
     /// The points, in world coordinates.

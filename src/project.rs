@@ -4,6 +4,7 @@
 //! without Rendering Artifacts, 2004). It needs no neighbours, so it also draws meshes whose topology moves; and it is
 //! a test bed, in which each published variant can be switched on: [`Switches`] are what differs.
 
+pub(crate) mod cpu;
 mod frame;
 pub(crate) mod gpu;
 mod keys;
@@ -70,8 +71,8 @@ pub enum Order {
     /// From back to front by the distance of their centres.
     #[default]
     Depth,
-    /// From back to front by the power of the eye with respect to their circumspheres: right for all cells that are of
-    /// a Delaunay mesh, and far off for slivers of others.
+    /// From back to front by the power of the eye with respect to their circumspheres, in f64: right for all cells of a
+    /// Delaunay mesh whose powers differ by more than rounding, and far off for slivers of others.
     Circumsphere,
     /// As they are stored.
     None,

@@ -78,15 +78,16 @@ impl<'a> Reference<'a> {
     pub fn new(mesh: &Mesh, tetrahedra: &Tetrahedra, field: &Field, transfer: &'a TransferFunction) -> Result<Self> {
         let (points, n) = (mesh.points(), field.kind().components());
         let count = if field.association() == Association::Point { points.len() } else { mesh.cells().len() };
-        if field.values().len() != count * n {
-            return Err(Error::Field(format!("the field has {} values for {count} tuples", field.values().len())));
+        let of_mesh = field.values();
+        if of_mesh.len() != count * n {
+            return Err(Error::Field(format!("the field has {} values for {count} tuples", of_mesh.len())));
         }
         // What the split adds is part of what is given.
         let (points, values) = (
             tetrahedra.points(points),
             match field.association() {
-                Association::Point => tetrahedra.values(field.values(), n),
-                Association::Cell => field.values().into(),
+                Association::Point => tetrahedra.values(of_mesh, n),
+                Association::Cell => of_mesh,
             },
         );
         let used = || tetrahedra.corners.iter().flatten().filter_map(|&p| points.get(p as usize));
@@ -101,9 +102,8 @@ impl<'a> Reference<'a> {
             let value = |corner: u32| {
                 let start = tuple(corner)? * n;
                 let values = values.get(start..start + n)?;
-                let at = |k: usize| {
-                    values.get(k).map_or(0.0, |&v| field.normal(k).mid + field.normal(k).half * f64::from(v))
-                };
+                let full = if field.kind() == Kind::Rgba { field.normal(0).half } else { 1.0 };
+                let at = |k: usize| values.get(k).map_or(0.0, |&v| if k < 3 { v / full } else { v });
                 Some([at(0), at(1), at(2), at(3)])
             };
             let mut tet =
@@ -255,6 +255,8 @@ impl Tetrahedron {
     /// Where the ray is inside. Outer none: it lies in a face; inner none: it misses.
     fn interval(&self, origin: DVec3, direction: DVec3, extent: f64) -> Option<Option<Interval>> {
         let mut t = [f64::NEG_INFINITY, f64::INFINITY];
+        // The corners opposite to the faces that the ray passes: their values do not count there.
+        let mut opposite = [4, 4];
         let mut faces = [(DVec3::ZERO, DVec3::ZERO); 4];
         let mut lies = false;
         for (k, weight) in faces.iter_mut().enumerate() {
@@ -276,17 +278,21 @@ impl Tetrahedron {
                 if (height > 0.0) == (side > 0.0) {
                     return Some(None);
                 }
-            } else if (slope > 0.0) == (side > 0.0) {
-                t[0] = t[0].max(height / slope);
             } else {
-                t[1] = t[1].min(height / slope);
+                let (end, at) = (usize::from((slope > 0.0) != (side > 0.0)), height / slope);
+                if (end == 0 && at > t[0]) || (end == 1 && at < t[1]) {
+                    (t[end], opposite[end]) = (at, k);
+                }
             }
         }
         if t[1] <= t[0] {
             return Some(None);
         }
-        let values = t.map(|t| {
-            let weights = faces.map(|(p, n)| n.dot(origin + direction * t - p).clamp(0.0, 1.0));
+        let values = [0, 1].map(|end| {
+            let mut weights = faces.map(|(p, n)| n.dot(origin + direction * t[end] - p).clamp(0.0, 1.0));
+            if let Some(weight) = weights.get_mut(opposite[end]) {
+                *weight = 0.0;
+            }
             let sum: f64 = weights.iter().sum();
             std::array::from_fn(|c| (0..4).map(|k| weights[k] / sum * self.values[k][c]).sum())
         });
@@ -314,7 +320,8 @@ impl Light {
             Emission::Direct { scale } => (scale, true),
         };
         let [a0, a1] = [piece.ends[0][3], piece.ends[1][3]];
-        let per_unit = piece.length / transfer.unit_distance();
+        // Beyond this nothing is seen of a depth, and 0 times it stays 0.
+        let per_unit = (piece.length / transfer.unit_distance()).min(1e25);
         let logarithmic = transfer.convention() == Convention::Opacity;
         // Pieces end where the opacity passes 1, so its mean tells on which side they are; their ends are off by
         // rounding.

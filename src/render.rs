@@ -1,17 +1,19 @@
 //! The whole flow behind one door: mesh, field, transfer function and view in, image out.
 
 mod backend;
+mod prepared;
 mod stats;
 mod tables;
 
 use crate::error::{Error, Result};
-use crate::field::{Field, Kind, Normal};
-use crate::geometry::{Geometry, Values};
+use crate::field::Field;
+use crate::geometry::Geometry;
 use crate::gpu::Part;
 use crate::gpu::table::builds;
 use crate::gpu::{DeviceChoice, Gpu};
 use crate::image::Image;
 use crate::integral::{Choice, Exact, Form, Lookup, lookup};
+use crate::memory;
 use crate::mesh::Mesh;
 use crate::mesh::cells::Tetrahedra;
 use crate::mesh::faces::Faces;
@@ -20,7 +22,8 @@ use crate::transfer::TransferFunction;
 use crate::view::{Blend, View};
 use backend::{Backend, Drawn};
 use glam::DVec3;
-pub use stats::{ProjectionStats, Stats};
+use prepared::{AnyValues, Prepared};
+pub use stats::{ProjectionStats, Stats, SweepStats};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -91,22 +94,41 @@ struct Loaded {
     geometry: Geometry,
     points: usize,
     cells: usize,
+    /// Whether cells know their neighbours.
+    connected: bool,
+    /// Whether it is too flat for a device, whose lengths are of 32 bits.
+    flat: bool,
     /// The longest edge of a cell, in normalised units, once somebody asked.
     longest: Option<f64>,
 }
 
-/// The field that is drawn.
-#[derive(Debug)]
-struct Prepared {
-    normal: [Normal; 4],
-    values: AnyValues,
-}
-
-#[derive(Debug)]
-enum AnyValues {
-    Scalar(Values<1>),
-    Pair(Values<2>),
-    Rgba(Values<4>),
+impl Loaded {
+    /// `tetrahedra` of `points`, of a mesh of so many cells; `connected` if anything but a device draws it.
+    fn new(
+        points: &[DVec3],
+        cells: usize,
+        tetrahedra: Tetrahedra,
+        connected: bool,
+        on_device: bool,
+        report: &(dyn Fn(f64) + Sync),
+    ) -> Self {
+        let count = points.len();
+        let points = tetrahedra.points(points);
+        let mut geometry = Geometry::default();
+        if !connected {
+            geometry = Geometry::unconnected(&points, &tetrahedra);
+        }
+        let flat = !connected && geometry.is_flat();
+        let connected = connected || flat;
+        if connected {
+            // Laying the mesh out takes about as long as matching its faces.
+            let faces = Faces::with_progress(&points, &tetrahedra.corners, &|share| report(share / 2.0));
+            geometry = Geometry::new(&points, &tetrahedra, &faces);
+        }
+        let flat = on_device && geometry.is_flat();
+        drop(points);
+        Loaded { tetrahedra, geometry, points: count, cells, connected, flat, longest: None }
+    }
 }
 
 impl Renderer {
@@ -169,8 +191,12 @@ impl Renderer {
     fn name_device(&mut self) {
         // Whether tables are built on the device depends on it.
         self.key = None;
-        self.stats.engine = self.backend.engine().into();
-        (self.stats.device, self.stats.adapter) = match self.backend.gpu() {
+        let flat = self.mesh.as_ref().is_some_and(|m| m.flat);
+        self.stats.engine = if flat { Backend::without_device().engine() } else { self.backend.engine() }.into();
+        if flat && self.backend.gpu().is_some() && self.stats.device != "cpu" {
+            tracing::warn!("the mesh is too flat for the 32-bit floats of a device; the CPU draws it, by the walk");
+        }
+        (self.stats.device, self.stats.adapter) = match self.backend.gpu().filter(|_| !flat) {
             Some(gpu) => ("gpu".into(), gpu.adapter.name.clone()),
             None => ("cpu".into(), format!("{} threads", self.pool.current_num_threads())),
         };
@@ -193,6 +219,8 @@ impl Renderer {
     pub fn set_integral(&mut self, integral: Choice) {
         if self.integral != integral {
             self.integral = integral;
+            // Values may have to be in the range of tables.
+            self.exact = None;
             (self.key, self.waits, self.host_builds) = (None, integral.form != Form::Auto, false);
         }
     }
@@ -210,28 +238,35 @@ impl Renderer {
 
     /// Draws another mesh from now on, split into `tetrahedra`; the field must be set again.
     pub fn set_mesh(&mut self, mesh: &Mesh, tetrahedra: Tetrahedra) {
-        self.load(mesh.points(), mesh.cells().len(), tetrahedra);
+        self.set_mesh_with_progress(mesh, tetrahedra, &|_| {});
     }
 
-    /// As [`Self::set_mesh`], of a mesh of so many `cells` and these points.
-    pub(crate) fn load(&mut self, points: &[DVec3], cells: usize, tetrahedra: Tetrahedra) {
+    /// As [`Self::set_mesh`]; `report` is called, on any thread, with the share of the work that is done: from 0 to 1,
+    /// never falling.
+    pub fn set_mesh_with_progress(&mut self, mesh: &Mesh, tetrahedra: Tetrahedra, report: &(dyn Fn(f64) + Sync)) {
+        self.load(mesh.points(), mesh.cells().len(), tetrahedra, report);
+    }
+
+    /// As [`Self::set_mesh_with_progress`], of a mesh of so many `cells` and these points.
+    pub(crate) fn load(
+        &mut self,
+        points: &[DVec3],
+        cells: usize,
+        tetrahedra: Tetrahedra,
+        report: &(dyn Fn(f64) + Sync),
+    ) {
         let start = Instant::now();
-        let connected = self.backend.needs_neighbours();
-        let geometry = self.pool.install(|| {
-            let points = tetrahedra.points(points);
-            if !connected {
-                return Geometry::unconnected(&points, &tetrahedra);
-            }
-            let faces = Faces::new(&points, &tetrahedra.corners);
-            Geometry::new(&points, &tetrahedra, &faces)
-        });
+        let (connected, on_device) = (self.backend.needs_neighbours(), self.backend.gpu().is_some());
+        let mesh = self.pool.install(|| Loaded::new(points, cells, tetrahedra, connected, on_device, report));
+        report(1.0);
         self.stats.faces_ms = ms(start);
         self.stats.cells = cells as u64;
-        self.stats.tetrahedra = tetrahedra.corners.len() as u64;
-        self.stats.device_bytes = geometry.bytes();
+        self.stats.tetrahedra = mesh.tetrahedra.corners.len() as u64;
+        self.stats.device_bytes = mesh.geometry.bytes();
         self.field = None;
         self.forget(Part::Mesh);
-        self.mesh = Some(Loaded { tetrahedra, geometry, points: points.len(), cells, longest: None });
+        self.mesh = Some(mesh);
+        self.name_device();
         self.waits = self.integral.form != Form::Auto;
     }
 
@@ -255,10 +290,28 @@ impl Renderer {
         self.pool.install(|| mesh.geometry.set_points(&moved));
         let scaled = mesh.geometry.scale != scale;
         (mesh.longest, self.key) = (None, None);
+        mesh.flat = self.backend.gpu().is_some() && mesh.geometry.is_flat();
+        if mesh.flat && !mesh.connected {
+            return self.connect(points);
+        }
+        self.name_device();
         self.backend.forget(Part::Points);
         // Extinction counts per normalised length.
         if scaled {
             self.forget(Part::Function);
+        }
+        Ok(())
+    }
+
+    /// Finds the neighbours of cells of a mesh that has become too flat for a device; its points are these.
+    fn connect(&mut self, points: &[DVec3]) -> Result<()> {
+        let field = self.field.take();
+        if let Some(Loaded { tetrahedra, cells, .. }) = self.mesh.take() {
+            self.load(points, cells, tetrahedra, &|_| {});
+        }
+        if let (Some(mut field), Some(mesh)) = (field, &self.mesh) {
+            self.pool.install(|| field.bring_to(mesh))?;
+            self.field = Some(field);
         }
         Ok(())
     }
@@ -270,18 +323,11 @@ impl Renderer {
     pub fn set_field(&mut self, field: &Field) -> Result<()> {
         let start = Instant::now();
         let mesh = self.mesh.as_ref().ok_or_else(|| Error::Render("a field needs a mesh first".into()))?;
-        let values = self.pool.install(|| match field.kind() {
-            Kind::Scalar => mesh.values(field).map(AnyValues::Scalar),
-            Kind::Pair => mesh.values(field).map(AnyValues::Pair),
-            Kind::Rgba => mesh.values(field).map(AnyValues::Rgba),
-        })?;
-        self.stats.device_bytes = mesh.geometry.bytes()
-            + match &values {
-                AnyValues::Scalar(v) => v.bytes(),
-                AnyValues::Pair(v) => v.bytes(),
-                AnyValues::Rgba(v) => v.bytes(),
-            };
-        self.field = Some(Prepared { normal: [0, 1, 2, 3].map(|k| field.normal(k)), values });
+        let tables = self.integral.form != Form::Exact;
+        let transfer = self.transfer.as_ref();
+        let prepared = self.pool.install(|| Prepared::new(mesh, field, transfer, tables))?;
+        self.stats.device_bytes = mesh.geometry.bytes() + prepared.values.bytes();
+        self.field = Some(prepared);
         self.forget(Part::Field);
         self.waits = self.integral.form != Form::Auto;
         self.stats.upload_ms = ms(start);
@@ -315,7 +361,19 @@ impl Renderer {
         if stopped.load(Relaxed) { Err(Error::Aborted) } else { Ok(image) }
     }
 
+    /// Whether there is memory to draw so many tetrahedra, in a mesh of so many points.
+    ///
+    /// # Errors
+    /// [`Error::NoMemory`] if there is not.
+    pub fn check_room(&self, points: usize, tetrahedra: &Tetrahedra) -> Result<()> {
+        let (points, count) = (points + tetrahedra.added.len(), tetrahedra.corners.len());
+        memory::check(&format!("{count} tetrahedra of {points} points"), Geometry::room(points, count))
+    }
+
     fn render_anyhow(&mut self, view: &View, progress: &Progress) -> Result<Image> {
+        let [w, h] = view.size();
+        let pixels = u64::from(w) * u64::from(h) * size_of::<[f32; 4]>() as u64;
+        memory::check(&format!("a picture of {w}x{h} pixels"), pixels)?;
         match self.try_render(view, progress) {
             Err(Error::Lost(why)) => {
                 tracing::warn!("{why}; opening it again");
@@ -349,19 +407,33 @@ impl Renderer {
         self.name_device();
     }
 
+    /// Normalises the values anew if the transfer function has changed and asks for it.
+    fn fit_values(&mut self) -> Result<()> {
+        let (None, Some(mesh), Some(field), Some(transfer)) =
+            (&self.exact, &self.mesh, &mut self.field, &self.transfer)
+        else {
+            return Ok(());
+        };
+        let tables = self.integral.form != Form::Exact;
+        let changed = self.pool.install(|| field.fit(mesh, transfer, tables))?;
+        field.warn(transfer);
+        if changed {
+            self.forget(Part::Field);
+        }
+        Ok(())
+    }
+
     fn try_render(&mut self, view: &View, progress: &Progress) -> Result<Image> {
         let start = Instant::now();
         let missing = |what: &str| Error::Render(format!("there is no {what} to draw"));
-        let on_device = !self.host_builds && self.backend.gpu().is_some_and(|gpu| builds(gpu, &self.integral));
+        let flat = self.mesh.as_ref().is_some_and(|m| m.flat);
+        let on_device = !flat && !self.host_builds && self.backend.gpu().is_some_and(|gpu| builds(gpu, &self.integral));
+        self.fit_values()?;
         let mesh = self.mesh.as_mut().ok_or_else(|| missing("mesh"))?;
         let field = self.field.as_ref().ok_or_else(|| missing("field"))?;
         let transfer = self.transfer.as_ref().ok_or_else(|| missing("transfer function"))?;
-        let kind = match field.values {
-            AnyValues::Scalar(_) => Kind::Scalar,
-            AnyValues::Pair(_) => Kind::Pair,
-            AnyValues::Rgba(_) => Kind::Rgba,
-        };
-        let exact = self.exact.get_or_insert_with(|| Exact::new(transfer, kind, &field.normal, mesh.geometry.scale));
+        let (kind, normal) = (field.kind(), field.normal());
+        let exact = self.exact.get_or_insert_with(|| Exact::new(transfer, kind, normal, mesh.geometry.scale));
         let key = match &self.key {
             Some(key) => key,
             None => {
@@ -382,7 +454,7 @@ impl Renderer {
                 let key = (choice.form != Form::Exact).then(|| {
                     let (pool, geometry) = (&self.pool, &mesh.geometry);
                     let longest = *mesh.longest.get_or_insert_with(|| pool.install(|| geometry.longest_edge()));
-                    let exact = Exact::new(transfer, kind, &field.normal, geometry.scale);
+                    let exact = Exact::new(transfer, kind, normal, geometry.scale);
                     Arc::new(Key { exact, choice, longest, on_device })
                 });
                 self.key.insert(key)
@@ -415,7 +487,8 @@ impl Renderer {
         let switches = &self.switches;
         let frame = Frame { mesh, field, transfer, exact, table, view, switches, progress };
         let uploaded = self.backend.gpu().map_or(0, Gpu::uploaded);
-        let backend = &mut self.backend;
+        let mut walk = Backend::without_device();
+        let backend = if mesh.flat { &mut walk } else { &mut self.backend };
         let drawn = self.pool.install(|| match &field.values {
             AnyValues::Scalar(v) => backend.draw(&frame, v),
             AnyValues::Pair(v) => backend.draw(&frame, v),
@@ -425,12 +498,12 @@ impl Renderer {
             self.stats.uploaded_bytes = gpu.uploaded() - uploaded;
             self.stats.device_bytes = gpu.allocated();
         }
-        let Drawn { pixels, counts, device_ms, projection } = drawn;
+        let Drawn { pixels, counts, device_ms, projection, sweep } = drawn;
         self.stats.device_ms = device_ms;
         self.stats.steps = counts.steps;
         self.stats.repaired_rays = counts.repaired;
         self.stats.cpu_rays = counts.unfinished;
-        self.stats.projection = projection;
+        (self.stats.projection, self.stats.sweep) = (projection, sweep);
         self.stats.frame_ms = ms(start);
         self.build_next(late)?;
         Ok(Image { size: view.size(), pixels })
@@ -453,12 +526,6 @@ impl Renderer {
     }
 }
 
-impl Loaded {
-    fn values<const N: usize>(&self, field: &Field) -> Result<Values<N>> {
-        Values::new(&self.geometry, &self.tetrahedra, self.points, self.cells, field)
-    }
-}
-
 /// Everything that a frame depends on.
 struct Frame<'a> {
     mesh: &'a Loaded,
@@ -474,7 +541,7 @@ struct Frame<'a> {
 impl Frame<'_> {
     /// The pixel of a ray whose largest values are `v`: colour and opacity there, premultiplied.
     fn largest<const N: usize>(&self, v: &[f32; N]) -> [f32; 4] {
-        let own = |k: usize| self.field.normal[k].invert(f64::from(v[k]));
+        let own = |k: usize| self.field.normal()[k].invert(f64::from(v[k]));
         let [r, g, b] =
             if N == 4 { [own(0), own(1), own(2)].map(|c| c.clamp(0.0, 1.0)) } else { self.transfer.color_at(own(0)) };
         let a = self.transfer.opacity_at(own(N - 1)).min(1.0);

@@ -11,12 +11,16 @@
 
 pub mod automatic;
 mod file;
+pub mod missing;
 mod opaque;
+mod reader;
 
 pub use opaque::Opaque;
+pub use reader::read;
 
 use crate::error::{Error, Result};
 use crate::field::{Association, Component, Field};
+use crate::memory;
 use crate::mesh::Mesh;
 use crate::transfer::TransferFunction;
 use crate::view::{Blend, Camera, ClippingPlane, DepthBuffer, DepthKind, View};
@@ -106,7 +110,7 @@ impl Scene {
     /// Reads a scene, and its depth image if it has one; the mesh is not opened.
     ///
     /// # Errors
-    /// [`Error::File`]; [`Error::Malformed`], which names the key; [`Error::Unsupported`] for bivariate widgets.
+    /// [`Error::File`]; [`Error::Malformed`], which names the key, or the line and column; [`Error::Unsupported`] for bivariate widgets.
     pub fn open(path: &Path) -> Result<Self> {
         let text = std::fs::read(path).map_err(|e| Error::file(path, e))?;
         Self::parse(path, &text)
@@ -117,15 +121,12 @@ impl Scene {
     /// # Errors
     /// As [`Scene::open`].
     pub fn parse(path: &Path, text: &[u8]) -> Result<Self> {
-        let mut json = serde_json::Deserializer::from_slice(text);
-        let file: file::File = serde_path_to_error::deserialize(&mut json).map_err(|e| {
-            let key = e.path().to_string();
-            let what = e.into_inner().to_string();
-            Error::malformed(path, if key == "." { what } else { format!("{key}: {what}") })
-        })?;
-        json.end().map_err(|e| Error::malformed(path, format!("after the scene: {e}")))?;
-        let value: Value = serde_json::from_slice(text).map_err(|e| Error::malformed(path, e.to_string()))?;
-        file::check(&value).map_err(|what| Error::malformed(path, what))?;
+        let malformed = |what| Error::malformed(path, what);
+        let value = reader::parse(text).map_err(malformed)?;
+        if !value.is_object() {
+            return Err(malformed("a scene is an object: {\"mesh\": ...}".into()));
+        }
+        let file: file::File = read(&value).map_err(malformed)?;
         file.scene(path)
     }
 
@@ -153,6 +154,8 @@ impl Scene {
         }
         let behind = self.background.unwrap_or_default().map(|c| c as f32);
         let [w, h] = self.size;
+        let pixels = u64::from(w) * u64::from(h) * (size_of::<f64>() + size_of::<[f32; 3]>()) as u64;
+        memory::check(&format!("the opaque objects in {w}x{h} pixels"), pixels)?;
         let (mut values, mut backdrop) = (Vec::new(), Vec::new());
         for (j, i) in (0..h).flat_map(|j| (0..w).map(move |i| (j, i))) {
             let mut ray = view.ray(i, j);

@@ -1,8 +1,11 @@
 //! The transfer function: colour and opacity as piecewise linear functions of the scalar, and the optical model that
 //! turns opacity into extinction.
 
+mod axis;
 pub mod colormap;
 mod space;
+
+pub use axis::Axis;
 
 use crate::error::{Error, Result};
 

@@ -1,5 +1,9 @@
 //! The view: camera, image size, and what limits each ray: clipping range, clipping planes, a depth buffer.
 
+mod framing;
+
+pub(crate) use framing::hull_area;
+
 use crate::error::{Error, Result};
 use glam::{DMat3, DMat4, DVec2, DVec3};
 

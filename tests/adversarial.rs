@@ -278,7 +278,7 @@ fn the_twisted_prism() {
         halite::mesh::Polyhedra { cells: vec![0, 8], faces: (0..=8).map(|f| 3 * f).collect(), points: faces.concat() };
     let bare = draw::mesh_of(points, [(42, &[0, 1, 2, 3, 4, 5][..])]).with_polyhedra(polyhedra).unwrap();
     let tetrahedra = Tetrahedra::new(&bare).unwrap();
-    assert_eq!((tetrahedra.corners.len(), tetrahedra.crooked), (8, 0));
+    assert_eq!((tetrahedra.corners.len(), tetrahedra.crooked.count), (8, 0));
 }
 
 /// Two tetrahedra and a pyramid on one warped quadrilateral, which these cut along one diagonal and it along the other:

@@ -506,3 +506,22 @@ fn malformed_parts_make_no_mesh() {
     check(tet(), vec![], vec![array(1, 2)], "cell array \"a\" has 2 values");
     assert!(Tetrahedra::new(&Mesh::default()).is_err());
 }
+
+/// From 0 to 1 without a step back, in steps that a bar can show.
+#[test]
+fn the_share_that_is_done_is_reported() {
+    let mesh = generate::hexahedra(41);
+    let told = std::sync::Mutex::new(Vec::new());
+    let check = || {
+        let told: Vec<f64> = std::mem::take(&mut *told.lock().unwrap());
+        assert!(told.first() == Some(&0.0) && told.last() == Some(&1.0) && told.is_sorted(), "{told:?}");
+        assert!(told.len() > 8 && told.windows(2).all(|w| w[1] - w[0] < 0.3), "{told:?}");
+    };
+    let report = |share: f64| told.lock().unwrap().push(share);
+    let tetrahedra = Tetrahedra::with_progress(&mesh, &report).unwrap();
+    check();
+    assert_eq!(tetrahedra, Tetrahedra::new(&mesh).unwrap());
+    let faces = Faces::with_progress(mesh.points(), &tetrahedra.corners, &report);
+    check();
+    assert_eq!(faces, Faces::new(mesh.points(), &tetrahedra.corners));
+}

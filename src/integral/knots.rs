@@ -32,6 +32,15 @@ pub(crate) struct Line<R> {
 /// Number of entries of the look-up that finds the interval of a scalar.
 pub(crate) const BUCKETS: usize = 512;
 
+/// Knots in a bucket that are looked through one by one.
+const CROWD: usize = 8;
+
+/// Greater than any slope, and finite in f32, so that its product with an interval of no width is 0.
+const STEEPEST: f64 = 1e38;
+
+/// The greatest colour, or emission per normalised unit of length.
+pub(super) const BRIGHTEST: f64 = 1e30;
+
 /// Beyond every normalised scalar.
 const FAR: f64 = 1e30;
 
@@ -46,7 +55,8 @@ impl<R: Real> Knots<R> {
         let slope = (0..knots.len())
             .map(|i| match knots.get(i + 1) {
                 Some(next) if s[i] < s[i + 1] => {
-                    [0, 1, 2, 3].map(|k| R::of((next.1[k] - knots[i].1[k]) / (next.0 - knots[i].0)))
+                    let slope = |k: usize| (next.1[k] - knots[i].1[k]) / (next.0 - knots[i].0);
+                    [0, 1, 2, 3].map(|k| R::of(slope(k).clamp(-STEEPEST, STEEPEST)))
                 }
                 _ => [R::of(0.0); 4],
             })
@@ -110,6 +120,21 @@ impl<R: Real> Knots<R> {
         self.value.iter().fold(R::of(0.0), |most, v| most.max(v[0]))
     }
 
+    /// Whether extinction changes by a share that can be seen, and not as a step, between knots closer than `width`.
+    pub(crate) fn is_sharp(&self, width: R) -> bool {
+        let seen = self.steepest() * R::of(1e-2);
+        self.s.windows(2).zip(self.value.windows(2)).any(|(s, v)| {
+            let rise = v[1][0] - v[0][0];
+            s[0] < s[1] && s[1] - s[0] < width && rise.max(-rise) > seen
+        })
+    }
+
+    /// The greatest extinction on the intervals from the first to the last of `lines`.
+    pub(crate) fn densest(&self, [first, last]: [u16; 2]) -> R {
+        let on = usize::from(first)..(usize::from(last) + 2).min(self.value.len());
+        self.value[on].iter().fold(R::of(0.0), |most, v| most.max(v[0]))
+    }
+
     /// Whether anything between `low` and `high` has extinction, or, if `direct`, a colour.
     pub(crate) fn shows(&self, low: f32, high: f32, direct: bool) -> bool {
         let channels = if direct { 4 } else { 1 };
@@ -118,6 +143,20 @@ impl<R: Real> Knots<R> {
         let positive = |v: &[R; 4]| v[..channels].iter().any(|&c| c > R::of(0.0));
         // Linear in between: from the knot below to the one above.
         self.value[first..(beyond + 1).min(self.value.len())].iter().any(positive)
+    }
+
+    /// The first and the last interval that values from `low` to `high` are on, both finite.
+    pub(crate) fn intervals(&self, low: R, high: R) -> [usize; 2] {
+        let first = self.interval(low);
+        if low == high {
+            return [self.of_constant(first, low); 2];
+        }
+        let mut last = self.interval(high);
+        // What only ends there is on the interval below.
+        while last > first && self.s[last] >= high {
+            last -= 1;
+        }
+        [first, last]
     }
 
     /// The interval that says what a constant `s` in the interval `i` is: if it is opaque as a single value, it is opaque all
@@ -136,7 +175,18 @@ impl<R: Real> Knots<R> {
     fn interval(&self, s: R) -> usize {
         let scaled = (s + R::of(1.0)) * R::of(BUCKETS as f64 / 2.0);
         let b = scaled.max(R::of(0.0)).min(R::of((BUCKETS - 1) as f64));
-        let mut i = self.bucket[b.truncate() as usize] as usize;
+        let b = b.truncate() as usize;
+        let mut i = self.bucket[b] as usize;
+        // Where many knots are in one bucket, by halves.
+        let mut above = self.bucket.get(b + 1).map_or(self.s.len() - 1, |&next| next as usize + 1);
+        while above > i + CROWD {
+            let middle = usize::midpoint(i, above);
+            if self.s[middle] <= s {
+                i = middle;
+            } else {
+                above = middle;
+            }
+        }
         while i > 0 && self.s[i] > s {
             i -= 1;
         }
@@ -147,12 +197,19 @@ impl<R: Real> Knots<R> {
     }
 }
 
-/// One linear value along a segment, and the interval of its function that it is in.
+/// One linear value along a segment, the interval of its function that it is in, and how far it has come.
+///
+/// Pieces of a segment are measured by values, not by shares of the segment: those of knots far nearer to each other than
+/// to the segment's ends have no share that could be told as the difference of two.
 pub(super) struct Track<'a, R> {
     knots: &'a Knots<R>,
     i: usize,
     front: R,
-    rise: R,
+    back: R,
+    pub(super) rise: R,
+    /// The value so far, and whether it is one of the segment's ends or a knot, and not computed.
+    pub(super) at: R,
+    known: bool,
 }
 
 impl<'a, R: Real> Track<'a, R> {
@@ -162,29 +219,66 @@ impl<'a, R: Real> Track<'a, R> {
         if rise == R::of(0.0) {
             i = knots.of_constant(i, front);
         }
-        Track { knots, i, front, rise }
+        Track { knots, i, front, back, rise, at: front, known: true }
+    }
+
+    /// The knot that the value moves to.
+    #[inline(always)]
+    fn ahead(&self) -> R {
+        self.knots.s[if self.rise > R::of(0.0) { self.i + 1 } else { self.i }]
+    }
+
+    /// Where the value leaves the interval, or the segment's end if that comes first, and whether it does.
+    #[inline(always)]
+    pub(super) fn next(&self) -> (R, bool) {
+        let (ahead, zero) = (self.ahead(), R::of(0.0));
+        let ends = if self.rise > zero { ahead >= self.back } else { self.rise == zero || ahead <= self.back };
+        (if ends { self.back } else { ahead }, ends)
+    }
+
+    /// How much of the segment lies before the value `s`.
+    #[inline(always)]
+    pub(super) fn share_before(&self, s: R) -> R {
+        if self.rise == R::of(0.0) { R::of(0.0) } else { (s - self.front) / self.rise }
     }
 
     /// Where in [0, 1] the value leaves the interval; above 1 if it does not.
     #[inline(always)]
     pub(super) fn end(&self) -> R {
-        let zero = R::of(0.0);
-        if self.rise > zero {
-            (self.knots.s[self.i + 1] - self.front) / self.rise
-        } else if self.rise < zero {
-            (self.knots.s[self.i] - self.front) / self.rise
+        if self.rise == R::of(0.0) { R::of(2.0) } else { self.share_before(self.ahead()) }
+    }
+
+    /// The value at `u`, which is not beyond [`Self::end`], and whether it is known exactly.
+    #[inline(always)]
+    pub(super) fn value(&self, u: R, end: R) -> (R, bool) {
+        if u >= R::of(1.0) {
+            (self.back, true)
+        } else if end <= u {
+            (self.ahead(), true)
         } else {
-            R::of(2.0)
+            let (low, high) = (self.knots.s[self.i], self.knots.s[self.i + 1]);
+            ((self.front + self.rise * u).max(low).min(high), false)
         }
     }
 
-    /// The function's value at `u`, by the line of the interval.
+    /// The share of the segment from the value so far to `to`, if both are known exactly.
     #[inline(always)]
-    pub(super) fn at(&self, u: R) -> [R; 4] {
-        let (low, high) = (self.knots.s[self.i], self.knots.s[self.i + 1]);
-        let offset = (self.front + self.rise * u).max(low).min(high) - low;
+    pub(super) fn share_to(&self, (to, known): (R, bool)) -> Option<R> {
+        (self.known && known && self.rise != R::of(0.0)).then(|| (to - self.at) / self.rise)
+    }
+
+    /// The function at `s`, by the line of the interval.
+    #[inline(always)]
+    pub(super) fn line(&self, s: R) -> [R; 4] {
+        let offset = s - self.knots.s[self.i];
         let (value, slope) = (&self.knots.value[self.i], &self.knots.slope[self.i]);
         [0, 1, 2, 3].map(|k| value[k] + slope[k] * offset)
+    }
+
+    /// Moves on to a value, known exactly or not.
+    #[inline(always)]
+    pub(super) fn move_to(&mut self, (at, known): (R, bool)) {
+        (self.at, self.known) = (at, known);
     }
 
     /// Steps to the next interval; false if there is none.
@@ -263,8 +357,9 @@ pub(super) fn extinction(transfer: &TransferFunction, opaque: f64) -> Vec<(f64, 
     if transfer.convention() == Convention::Extinction {
         return knots.iter().map(|&(s, a)| (s, [transfer.extinction(a).min(opaque)])).collect();
     }
-    // On its way to 1: what lies beyond `OPAQUE` has no length that f32 could tell.
-    let tau = |a: f64| [-(-a.min(OPAQUE)).ln_1p() / transfer.unit_distance()];
+    // On its way to 1: what lies beyond `OPAQUE` has no length that f32 could tell. Where the unit distance is tiny, all that
+    // is not transparent is opaque.
+    let tau = |a: f64| [(-(-a.min(OPAQUE)).ln_1p() / transfer.unit_distance()).min(opaque)];
     let mut curve = vec![];
     for w in knots.windows(2) {
         let [(s0, a0), (s1, a1)] = [w[0], w[1]];

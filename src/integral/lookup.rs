@@ -13,6 +13,9 @@ const UNIFORM_ERROR: f64 = 0.02;
 /// What bounds the error of other tables that are smaller than the number of knots asks for.
 const SMALL_ERROR: f64 = 2e-3;
 
+/// How far values are in a table's range, ±1, but for rounding.
+const WITHIN: f32 = 1.000_001;
+
 /// Texels of one length by which a range is chosen.
 const SOME: usize = 1024;
 
@@ -323,12 +326,29 @@ impl Lookup {
         [r * seen, g * seen, b * seen, alpha]
     }
 
-    /// Adds a segment of `length` to `light`. Values that are not finite make it invisible.
+    /// Adds a segment of `length` to `light`. Values that are not finite make it invisible. Beyond ±1 the function is
+    /// constant: that part of a segment is integrated exactly.
     #[inline]
-    pub fn add(&self, front: f32, back: f32, length: f32, light: &mut Light<f32>) {
-        if front.is_finite() && back.is_finite() {
+    pub fn add(&self, exact: &Exact<f32>, front: f32, back: f32, length: f32, light: &mut Light<f32>) {
+        if !(front.is_finite() && back.is_finite()) {
+            return;
+        }
+        if front.abs().max(back.abs()) <= WITHIN {
             let [r, g, b, alpha] = self.look_up(front, back, length);
-            light.add([r, g, b], alpha);
+            return light.add([r, g, b], alpha);
+        }
+        let (near, far) = (front.clamp(-1.0, 1.0), back.clamp(-1.0, 1.0));
+        if near == far {
+            return exact.add(&[front], &[back], length, light);
+        }
+        let part = |from: f32, to: f32| (to - from) / (back - front) * length;
+        if front != near {
+            exact.add(&[front], &[near], part(front, near), light);
+        }
+        let [r, g, b, alpha] = self.look_up(near, far, part(near, far));
+        light.add([r, g, b], alpha);
+        if back != far {
+            exact.add(&[far], &[back], part(far, back), light);
         }
     }
 }

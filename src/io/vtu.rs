@@ -18,7 +18,6 @@ use grid::Grid;
 use head::{Head, Piece};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
 use std::sync::atomic::Ordering::Relaxed;
 
 /// What a VTK XML file holds.
@@ -121,7 +120,7 @@ impl Document {
             }
         }
         let expected = pieces.iter().map(Piece::expected).sum::<f64>().max(1.0);
-        let progress = Progress { tell, expected, done: Mutex::new(0) };
+        let progress = Progress::new(tell, expected);
         let (mut mesh, left_out) = Grid { path: &self.path, stores, pieces, progress }.mesh()?;
         for (all, more) in attributes.iter_mut().zip(left_out) {
             all.left_out.extend(more);

@@ -7,7 +7,7 @@
 //! that do not share point indices agree too; indices only break ties.
 //!
 //! Linear cells (`linear`) are split so; cells of higher order are, through all their nodes (`curved`), and polyhedra
-//! around a point in their middle (`polyhedron`). Both may add points to those of the mesh.
+//! around points inside (`polyhedron`). Both may add points to those of the mesh.
 
 mod curved;
 mod linear;
@@ -18,7 +18,9 @@ mod types;
 pub use types::{dimension, name};
 
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::mesh::Mesh;
+use crate::progress::Progress;
 use glam::DVec3;
 use polyhedron::Cut;
 use rayon::prelude::*;
@@ -48,8 +50,45 @@ pub struct Tetrahedra {
     pub added: Added,
     /// The cells that were left out, by reason.
     pub skipped: Skipped,
-    /// Polyhedra with no point inside that sees all of their faces: some of their tetrahedra overlap.
-    pub crooked: usize,
+    /// Polyhedra whose surface crosses itself: some of their tetrahedra overlap.
+    pub crooked: Listed,
+}
+
+/// Cells that have something in common.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Listed {
+    /// How many there are.
+    pub count: usize,
+    /// The first of them, at most [`Listed::MOST`], ascending.
+    pub first: Vec<usize>,
+}
+
+impl Listed {
+    /// So many cells are named.
+    pub const MOST: usize = 3;
+
+    fn add(&mut self, cell: usize) {
+        self.count += 1;
+        if self.first.len() < Self::MOST {
+            self.first.push(cell);
+        }
+    }
+
+    fn merge(&mut self, other: &Self) {
+        self.count += other.count;
+        self.first.extend(&other.first);
+        self.first.truncate(Self::MOST);
+    }
+}
+
+/// The cells that are named: "cell 7", "cells 7, 8, 9 and more".
+impl std::fmt::Display for Listed {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let names: Vec<String> = self.first.iter().map(usize::to_string).collect();
+        let (s, more) =
+            (if self.count == 1 { "" } else { "s" }, if self.count > names.len() { " and more" } else { "" });
+        write!(f, "cell{s} {}{more}", names.join(", "))
+    }
 }
 
 /// Points that a split added, each the weighted mean of points of the mesh. Values at points are made likewise.
@@ -107,12 +146,17 @@ pub struct Skipped {
     pub invisible: usize,
     /// Polyhedra without a face of three points or more.
     pub empty: usize,
+    /// Polyhedra whose faces do not close a surface.
+    pub open: Listed,
+    /// Polyhedra with faces, but without volume.
+    pub flat: Listed,
 }
 
 impl Skipped {
     /// The number of cells left out for any reason.
     pub fn total(&self) -> usize {
-        self.lower_dimensional + self.unsupported.values().sum::<usize>() + self.ghost + self.invisible + self.empty
+        let polyhedra = self.empty + self.open.count + self.flat.count;
+        self.lower_dimensional + self.unsupported.values().sum::<usize>() + self.ghost + self.invisible + polyhedra
     }
 
     /// Tells the log: what might be missed as a warning.
@@ -122,6 +166,16 @@ impl Skipped {
         }
         if self.invisible > 0 {
             tracing::warn!("{} cells are left out: they have a point that is not finite", self.invisible);
+        }
+        if self.open.count > 0 {
+            let (count, cells) = (self.open.count, &self.open);
+            tracing::warn!(
+                "{count} cells are left out: they are polyhedra whose faces do not close a surface ({cells})"
+            );
+        }
+        if self.flat.count > 0 {
+            let (count, cells) = (self.flat.count, &self.flat);
+            tracing::warn!("{count} cells are left out: they are polyhedra without volume ({cells})");
         }
         if self.lower_dimensional > 0 {
             tracing::info!("{} cells are left out: they have no volume (2D or less)", self.lower_dimensional);
@@ -139,6 +193,8 @@ impl Skipped {
         self.ghost += other.ghost;
         self.invisible += other.invisible;
         self.empty += other.empty;
+        self.open.merge(&other.open);
+        self.flat.merge(&other.flat);
         for (t, n) in other.unsupported {
             *self.unsupported.entry(t).or_default() += n;
         }
@@ -153,11 +209,27 @@ impl Tetrahedra {
     /// [`Error::Empty`] if no 3D cell is left to draw; [`Error::Mesh`] if a cell has not the number of points that its
     /// type demands, or if there would be more than [`MAX_TETRAHEDRA`], or 2³² points.
     pub fn new(mesh: &Mesh) -> Result<Self> {
+        Self::with_progress(mesh, &|_| {})
+    }
+
+    /// As [`Tetrahedra::new`]; `report` is called, on any thread, with the share of the work that is done: from 0 to 1,
+    /// never falling.
+    ///
+    /// # Errors
+    /// Likewise.
+    pub fn with_progress(mesh: &Mesh, report: &(dyn Fn(f64) + Sync)) -> Result<Self> {
+        report(0.0);
         let splitter = Splitter::new(mesh);
         let n = mesh.cells().len();
-        let counts: Vec<Count> = (0..n.div_ceil(CHUNK))
+        // Each chunk is gone through twice.
+        let progress = Progress::new(report, 2.0 * n.div_ceil(CHUNK) as f64);
+        let mut counts: Vec<Count> = (0..n.div_ceil(CHUNK))
             .into_par_iter()
-            .map_init(Cut::default, |cut, i| splitter.count(chunk(i, n), cut))
+            .map_init(Cut::default, |cut, i| {
+                let count = splitter.count(chunk(i, n), cut);
+                progress.add(1);
+                count
+            })
             .collect::<Result<_>>()?;
         let skipped = counts.iter().fold(Skipped::default(), |all, count| all.merge(count.skipped.clone()));
         let counted: Vec<usize> = counts.iter().map(|count| count.tetrahedra).collect();
@@ -173,15 +245,18 @@ impl Tetrahedra {
             );
             return Err(Error::Mesh(what));
         }
+        let bytes = total * (size_of::<[u32; 4]>() + size_of::<u32>()) + added * 200;
+        memory::check(&format!("{total} tetrahedra of its cells"), bytes as u64)?;
         let firsts = counts.iter().scan(first, |at, count| {
             *at += count.added;
             Some((*at - count.added) as u32)
         });
         let firsts: Vec<u32> = firsts.collect();
-        let mut corners = vec![[0; 4]; total];
+        let solved: Vec<_> = counts.iter_mut().map(|count| std::mem::take(&mut count.solved)).collect();
+        let mut corners = memory::filled("the tetrahedra of its cells", [0; 4], total)?;
         let one_to_one = skipped.total() == 0 && mesh.cells().types.par_iter().all(|&t| t == 10);
-        let mut cell = if one_to_one { Vec::new() } else { vec![0; total] };
-        let parts: Vec<(Added, usize)> = split_by(&mut corners, &counted)
+        let mut cell = if one_to_one { Vec::new() } else { memory::filled("the cells of tetrahedra", 0, total)? };
+        let parts: Vec<(Added, Listed)> = split_by(&mut corners, &counted)
             .into_par_iter()
             .zip(if one_to_one {
                 counts.iter().map(|_| <&mut [u32]>::default()).collect()
@@ -189,7 +264,11 @@ impl Tetrahedra {
                 split_by(&mut cell, &counted)
             })
             .enumerate()
-            .map(|(i, (corners, cell))| splitter.fill(chunk(i, n), firsts[i], corners, cell))
+            .map(|(i, (corners, cell))| {
+                let part = splitter.fill(chunk(i, n), &solved[i], firsts[i], corners, cell);
+                progress.add(1);
+                part
+            })
             .collect();
         let mut added = Added { first: first as u32, ..Added::default() };
         for (part, _) in &parts {
@@ -198,9 +277,19 @@ impl Tetrahedra {
             added.sources.extend_from_slice(&part.sources);
             added.weights.extend_from_slice(&part.weights);
         }
-        let crooked = parts.iter().map(|part| part.1).sum();
+        let mut crooked = Listed::default();
+        parts.iter().for_each(|part| crooked.merge(&part.1));
         let cells = n - skipped.total();
         Ok(Tetrahedra { corners, cell: (!one_to_one).then_some(cell), cells, added, skipped, crooked })
+    }
+
+    /// Tells the log what is left out, and what cannot be drawn right.
+    pub fn log(&self) {
+        self.skipped.log();
+        if self.crooked.count > 0 {
+            let (count, cells) = (self.crooked.count, &self.crooked);
+            tracing::warn!("{count} cells are drawn with overlaps: they are polyhedra that cross themselves ({cells})");
+        }
     }
 
     /// The points that [`Tetrahedra::corners`] index: those of the mesh, and after them those that the split added.
@@ -215,20 +304,29 @@ impl Tetrahedra {
         Cow::Owned(of_mesh.par_iter().copied().chain(added).collect())
     }
 
-    /// The same for values, `components` of them for each point.
+    /// The values at the points that the split added, `components` for each, from `value` of those of the mesh.
+    pub fn added_values(&self, components: usize, value: impl Fn(usize) -> f64 + Sync) -> Vec<f64> {
+        let at = |i: usize| {
+            let (point, k) = (i / components, i % components);
+            let share = |(source, weight): (u32, f64)| weight * value(source as usize * components + k);
+            self.added.of(point).map(share).sum()
+        };
+        (0..self.added.len() * components).into_par_iter().map(at).collect()
+    }
+
+    /// All values at [`Self::points`], `components` for each: those of the mesh, and after them those that the split
+    /// added.
     ///
     /// # Panics
     /// If there are fewer values than the mesh that was split has points, times `components`.
-    pub fn values<'a>(&self, of_mesh: &'a [f32], components: usize) -> Cow<'a, [f32]> {
+    pub fn values<'a>(&self, of_mesh: Cow<'a, [f64]>, components: usize) -> Cow<'a, [f64]> {
         if self.added.is_empty() {
-            return Cow::Borrowed(of_mesh);
+            return of_mesh;
         }
-        let value = |i: usize, k: usize| {
-            let at = |(source, weight): (u32, f64)| weight * f64::from(of_mesh[source as usize * components + k]);
-            self.added.of(i).map(at).sum::<f64>() as f32
-        };
-        let added = (0..self.added.len() * components).into_par_iter().map(|i| value(i / components, i % components));
-        Cow::Owned(of_mesh.par_iter().copied().chain(added).collect())
+        let added = self.added_values(components, |i| of_mesh[i]);
+        let mut all = of_mesh.into_owned();
+        all.extend(added);
+        Cow::Owned(all)
     }
 }
 
@@ -271,6 +369,8 @@ fn nothing_left(mesh: &Mesh, skipped: &Skipped) -> String {
         (skipped.ghost, "ghosts or hidden"),
         (skipped.invisible, "with points that are NaN or infinite"),
         (skipped.empty, "polyhedra without faces"),
+        (skipped.open.count, "polyhedra whose faces do not close a surface"),
+        (skipped.flat.count, "polyhedra without volume"),
     ]
     .into_iter()
     .filter(|(n, _)| *n > 0)

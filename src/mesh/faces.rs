@@ -5,6 +5,7 @@
 //! Floating-Point Arithmetic and Fast Robust Geometric Predicates, 1997), so along any chain of neighbours the
 //! orientation is coherent. Tetrahedra whose volume is exactly zero take the orientation that their neighbours demand.
 
+use crate::progress::{Progress, Report};
 use glam::DVec3;
 use rayon::prelude::*;
 use robust::Coord3D;
@@ -68,9 +69,21 @@ impl Faces {
     /// # Panics
     /// If a corner is not an index into `points`.
     pub fn new(points: &[DVec3], corners: &[[u32; 4]]) -> Self {
+        Self::with_progress(points, corners, &|_| {})
+    }
+
+    /// As [`Faces::new`]; `report` is called, on any thread, with the share of the work that is done: from 0 to 1, never
+    /// falling.
+    ///
+    /// # Panics
+    /// Likewise.
+    pub fn with_progress(points: &[DVec3], corners: &[[u32; 4]], report: &(dyn Fn(f64) + Sync)) -> Self {
+        report(0.0);
         let weld = weld(points);
+        report(0.05);
         let matcher = Matcher { points: points.len(), corners, weld: weld.as_deref() };
         let mut orientation = matcher.orientations(points);
+        report(0.15);
         let count = |sign: i8| orientation.par_iter().filter(|&&o| o == sign).count();
         let (flat, degenerate) = (count(FLAT), count(DEGENERATE));
         // From here on 0 means "not known yet" for flat tetrahedra; degenerate ones never come up.
@@ -78,13 +91,14 @@ impl Faces {
 
         let neighbours: Vec<[AtomicU32; 4]> =
             corners.par_iter().map(|_| [const { AtomicU32::new(BOUNDARY) }; 4]).collect();
-        let (mut tally, groups) = matcher.match_oriented(&orientation, degenerate, &neighbours);
+        let (mut tally, groups) = matcher.match_oriented(&orientation, degenerate, &neighbours, report);
         if !groups.is_empty() {
             matcher.orient_flat(&groups, &mut orientation);
             for group in &groups {
                 tally = tally.plus(matcher.pair(group, &orientation, &neighbours));
             }
         }
+        report(0.95);
         let neighbours: Vec<[u32; 4]> = neighbours.into_iter().map(|n| n.map(AtomicU32::into_inner)).collect();
         let boundary = (0..corners.len())
             .into_par_iter()
@@ -95,6 +109,7 @@ impl Faces {
                 (0..4u8).filter(open).map(move |k| (t as u32, k))
             })
             .collect();
+        report(1.0);
         Faces {
             boundary,
             weld,
@@ -223,12 +238,14 @@ impl Matcher<'_> {
         (v, parity)
     }
 
-    /// Pairs all faces whose tetrahedra have a known orientation, and returns the others, grouped.
+    /// Pairs all faces whose tetrahedra have a known orientation, and returns the others, grouped. The share that is
+    /// done goes from 0.15 to 0.9.
     fn match_oriented(
         &self,
         orientation: &[i8],
         degenerate: usize,
         neighbours: &[[AtomicU32; 4]],
+        report: Report<'_>,
     ) -> (Tally, Vec<Vec<Half>>) {
         // Faces are dealt into buckets by ranges of their smallest point: the sorts then stay in the cache, and so do
         // the tetrahedra of a file that numbers neighbouring points alike.
@@ -242,6 +259,9 @@ impl Matcher<'_> {
             let smallest = OUTWARD[f as usize % 4].map(|i| w[i]).into_iter().fold(u32::MAX, u32::min);
             (!skip(t)).then_some((smallest / width) as usize)
         });
+        let report = |share: f64| report(0.35 + 0.55 * share);
+        report(0.0);
+        let progress = Progress::new(&report, buckets.len() as f64);
         let results: Vec<(Tally, Vec<Vec<Half>>)> = (0..buckets.len())
             .into_par_iter()
             .map_init(Vec::new, |keys: &mut Vec<u128>, b| {
@@ -265,6 +285,7 @@ impl Matcher<'_> {
                         tally = tally.plus(self.pair(&group, orientation, neighbours));
                     }
                 }
+                progress.add(1);
                 (tally, later)
             })
             .collect();

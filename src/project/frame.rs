@@ -59,6 +59,9 @@ impl Frame {
 pub(super) struct Seen {
     pub(super) frame: Frame,
     pub(super) perspective: bool,
+    /// The eye of a perspective view in normalised coordinates, and the direction of the view.
+    pub(super) eye: Option<DVec3>,
+    pub(super) direction: DVec3,
     pub(super) planes: Vec<[f32; 4]>,
     /// Where a depth buffer ends each pixel's ray; empty without one.
     pub(super) ends: Vec<f32>,
@@ -130,6 +133,7 @@ impl Seen {
             unused: [0.0; 2],
             pixel: [2.0 / view.size()[0] as f32, -2.0 / view.size()[1] as f32],
         };
-        Seen { frame, perspective, planes, ends }
+        let eye = view.eye().map(|eye| (eye - geometry.centre) * geometry.scale);
+        Seen { frame, perspective, eye, direction: view.forward(), planes, ends }
     }
 }

@@ -85,7 +85,7 @@ fn range_of<const N: usize>(v: [[f32; N]; 4]) -> Option<[f32; 2]> {
 /// In how many parts a cell is drawn whose values are in a range, of which `bins` tell what is seen; 0 if nothing is.
 fn parts_of([low, high]: [f32; 2], bins: &[lines::End], parts: Parts) -> u32 {
     // One further than needed: rounding.
-    let end_below = |s: f32| (((s + 1.0) * (BINS as f32 / 2.0)) as i32 - 1).clamp(0, BINS as i32 - 1) as usize;
+    let end_below = |s: f32| (((s + 1.0) * (BINS as f32 / 2.0)).clamp(0.0, BINS as f32) as usize).saturating_sub(1);
     let (below, above) = (bins[end_below(low)], bins[(end_below(high) + 3).min(BINS)]);
     match parts {
         _ if above.shown == below.shown => 0,
@@ -94,14 +94,31 @@ fn parts_of([low, high]: [f32; 2], bins: &[lines::End], parts: Parts) -> u32 {
     }
 }
 
-/// The centre of the sphere through the corners, from the first of them, and the square of its radius; none if the
-/// cell is all but flat.
-fn circumsphere(p: [Vec3; 4]) -> Option<(Vec3, f32)> {
+/// How far a cell is for [`Order::Circumsphere`]: the power of the eye with respect to the sphere through the corners, which
+/// are seen from the eye; in a parallel view, whose eye is beyond all, how deep the sphere's centre is. Of a cell that is all
+/// but flat, the same of its middle.
+fn power(p: [DVec3; 4], forward: Option<DVec3>) -> f64 {
     let [b, c, d] = [p[1] - p[0], p[2] - p[0], p[3] - p[0]];
     let sum = b.length_squared() * c.cross(d) + c.length_squared() * d.cross(b) + d.length_squared() * b.cross(c);
     let centre = sum / (2.0 * b.dot(c.cross(d)));
-    let square = centre.length_squared();
-    (square < FAR).then_some((centre, square))
+    if centre.length_squared() < f64::from(FAR) {
+        // Without the radius, whose square is that of the way from the first corner to the centre.
+        return forward.map_or_else(|| p[0].dot(p[0] + 2.0 * centre), |forward| (p[0] + centre).dot(forward));
+    }
+    let middle = p.iter().sum::<DVec3>() / 4.0;
+    forward.map_or_else(|| middle.length_squared(), |forward| middle.dot(forward))
+}
+
+/// Keys by rank, from the farthest cell on, of cells of these distances and numbers of parts; none of those that are not seen.
+fn ranked(cells: Vec<Option<(f64, u32)>>) -> Vec<u32> {
+    let mut seen: Vec<(f64, u32)> = (0..).zip(&cells).filter_map(|(i, c)| c.map(|c| (c.0, i))).collect();
+    seen.par_sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    let mut keys = vec![HIDDEN; cells.len()];
+    for (rank, (_, i)) in (0..).zip(seen) {
+        let count = cells[i as usize].map_or(1, |c| c.1);
+        keys[i as usize] = (rank * MOST_PARTS) | (count - 1);
+    }
+    keys
 }
 
 /// Whether no pixel's centre is within the rectangle around points of the image.
@@ -128,39 +145,49 @@ pub(super) fn keys<const N: usize>(
     let places = places(&geometry.points, seen);
     let [.., forward] = seen.frame.axes();
     let ahead = seen.frame.ahead();
-    let key = |(i, cell): (usize, &Cell)| {
+    let count = |i: usize, cell: &Cell| {
         let corners = cell.corners.map(|c| places[c as usize]);
         let all = corners.iter().fold(!NEAR, |bits, c| bits & c.beyond);
         let is_near = corners.iter().any(|c| c.beyond & NEAR != 0);
         if all != 0 || !is_near && between_pixels(corners.map(|c| c.pixel)) {
-            return HIDDEN;
+            return 0;
         }
         let range = match values {
             Values::Point(v) => range_of(cell.corners.map(|c| v[c as usize])),
             Values::Corner(v) => range_of(v[i]),
             Values::Cell(v) => range_of([v[i]; 4]),
         };
-        let count = match range.map_or(0, |range| parts_of(range, bins, parts)) {
-            0 => return HIDDEN,
+        match range.map_or(0, |range| parts_of(range, bins, parts)) {
+            0 => 0,
             _ if is_near && parts == Parts::AroundEye => 3,
             count => count,
-        };
-        let p = corners.map(|c| c.p);
-        let sphere = if by == Order::Circumsphere { circumsphere(p) } else { None };
-        let (middle, square) = match sphere {
-            Some((centre, square)) => (p[0] + centre, square),
-            None => ((p[0] + p[1] + p[2] + p[3]) * 0.25, 0.0),
-        };
-        // Of the squared distance from the eye, with a sphere's radius taken away; its digits are kept where the eye
-        // is far.
+        }
+    };
+    let cells = geometry.cells.par_iter().with_min_len(LEAST).enumerate();
+    if by == Order::Circumsphere {
+        // In f64, which spheres of slivers and of cells far away ask for.
+        let (eye, parallel) = (seen.eye.unwrap_or_default(), seen.eye.is_none().then_some(seen.direction));
+        let power = |cell: &Cell| power(cell.corners.map(|c| geometry.points[c as usize] - eye), parallel);
+        return ranked(
+            cells.map(|(i, cell)| Some(count(i, cell)).filter(|&n| n > 0).map(|n| (power(cell), n))).collect(),
+        );
+    }
+    let key = |(i, cell): (usize, &Cell)| {
+        let count = count(i, cell);
+        if count == 0 {
+            return HIDDEN;
+        }
+        let p = cell.corners.map(|c| places[c as usize].p);
+        let middle = (p[0] + p[1] + p[2] + p[3]) * 0.25;
+        // Of the squared distance from the eye; its digits are kept where the eye is far.
         let mut depth = middle.dot(forward);
         if seen.perspective {
-            depth = (middle.length_squared() - square + 2.0 * ahead * depth) / f32::max(2.0 * ahead, 1.0);
+            depth = (middle.length_squared() + 2.0 * ahead * depth) / f32::max(2.0 * ahead, 1.0);
         }
         let bits = depth.to_bits();
         let descending = if depth.is_sign_negative() { bits } else { !(bits | 1 << 31) };
         // No finite depth gives HIDDEN.
         descending & !(MOST_PARTS - 1) | (count - 1)
     };
-    geometry.cells.par_iter().with_min_len(LEAST).enumerate().map(key).collect()
+    cells.map(key).collect()
 }

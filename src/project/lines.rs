@@ -28,6 +28,9 @@ const SLIGHT_PIECE: f64 = 0.3;
 /// The most lines that a record holds.
 const MOST: usize = 3;
 
+/// Knots closer than this ask for values that are accurate relative to themselves.
+const SHARP: f32 = 1e-3;
+
 /// Lines in a row of the image of them.
 pub(super) const LINES_ACROSS: usize = 4096;
 
@@ -90,6 +93,10 @@ impl Lines {
         let within = |values: f32| exact.opacity.lines_within(values + 5.0 * (2.0 / BINS as f32));
         let depth = f64::from(exact.opacity.steepest()) * extent.edge;
         let most = if in_parts { MOST * MOST_PARTS as usize } else { MOST };
+        // Counted from a cell's least value, others are known to 1e-7 only.
+        if extent.values > 4.0 || exact.opacity.is_sharp(SHARP) {
+            return Lines::looked_up(exact.kind);
+        }
         match within(extent.values) {
             lines if depth <= DEEPEST && lines <= most && within(extent.mean) <= MOST => {
                 Lines::All { count: lines.min(MOST), slight: depth <= SLIGHT }

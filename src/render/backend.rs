@@ -2,12 +2,13 @@
 //! what it does in each of these methods.
 
 use super::Frame;
-use super::stats::ProjectionStats;
+use super::stats::{ProjectionStats, SweepStats};
 use crate::error::{Error, Result};
 use crate::geometry::Values;
 use crate::gpu::{DeviceChoice, Gpu, Part};
 use crate::integral::{Exact, Integral, Lookup};
-use crate::project::{self, gpu::Project};
+use crate::project::cpu::{self as sweep, Sweep};
+use crate::project::{self, Switches, gpu::Project};
 use crate::render::Engine;
 use crate::traverse::cpu;
 use crate::traverse::gpu::Traverse;
@@ -22,6 +23,8 @@ pub(crate) enum Backend {
     Walk,
     /// The walk on a device.
     WalkOnDevice(Box<Traverse>),
+    /// Projected cells on the CPU.
+    Project(Box<Sweep>),
     /// Projected cells on a device.
     ProjectOnDevice(Box<Project>),
 }
@@ -36,6 +39,8 @@ pub(super) struct Drawn {
     pub(super) device_ms: Option<f64>,
     /// What a projection did.
     pub(super) projection: Option<ProjectionStats>,
+    /// What a projection on the CPU did.
+    pub(super) sweep: Option<SweepStats>,
 }
 
 impl Backend {
@@ -45,6 +50,9 @@ impl Backend {
     /// [`Error::Device`] if the device is none of this machine's or cannot be used, or if the engine needs one and there
     /// is none.
     pub(super) fn open(engine: Engine, choice: &DeviceChoice) -> Result<Self> {
+        if engine == Engine::Project && *choice == DeviceChoice::Cpu {
+            return Ok(Backend::Project(Box::new(Sweep::new())));
+        }
         if engine == Engine::Project {
             return Ok(Backend::ProjectOnDevice(Box::new(Project::open(choice)?)));
         }
@@ -68,6 +76,11 @@ impl Backend {
         if let Backend::ProjectOnDevice(project) = self { Some(project) } else { None }
     }
 
+    #[cfg(test)]
+    pub(crate) fn sweep(&mut self) -> Option<&mut Sweep> {
+        if let Backend::Project(sweep) = self { Some(sweep) } else { None }
+    }
+
     /// What draws where no device does any more.
     pub(super) fn without_device() -> Self {
         Backend::Walk
@@ -77,14 +90,14 @@ impl Backend {
     pub(super) fn engine(&self) -> &'static str {
         match self {
             Backend::Walk | Backend::WalkOnDevice(_) => "traverse",
-            Backend::ProjectOnDevice(_) => "project",
+            Backend::Project(_) | Backend::ProjectOnDevice(_) => "project",
         }
     }
 
     /// The device that draws; none if it is the CPU.
     pub(super) fn gpu(&self) -> Option<&Gpu> {
         match self {
-            Backend::Walk => None,
+            Backend::Walk | Backend::Project(_) => None,
             Backend::WalkOnDevice(traverse) => Some(traverse.gpu()),
             Backend::ProjectOnDevice(project) => Some(project.gpu()),
         }
@@ -103,7 +116,7 @@ impl Backend {
     /// Takes `part` for changed.
     pub(super) fn forget(&mut self, part: Part) {
         match self {
-            Backend::Walk => {}
+            Backend::Walk | Backend::Project(_) => {}
             Backend::WalkOnDevice(traverse) => traverse.forget(part),
             Backend::ProjectOnDevice(project) => project.forget(part),
         }
@@ -112,7 +125,9 @@ impl Backend {
     /// Has the device that draws hold `table`, or build it; `wait`s until that is done.
     pub(super) fn hold(&mut self, exact: &Exact<f32>, table: &Arc<Lookup>, wait: bool) -> Result<()> {
         let gpu = match self {
-            Backend::Walk => return Err(Error::Device("there is no device to build a table".into())),
+            Backend::Walk | Backend::Project(_) => {
+                return Err(Error::Device("there is no device to build a table".into()));
+            }
             Backend::WalkOnDevice(traverse) => {
                 traverse.prepare_table(exact, Some(table))?;
                 traverse.gpu()
@@ -130,6 +145,7 @@ impl Backend {
         match self {
             Backend::Walk => Ok(walk(frame, values)),
             Backend::WalkOnDevice(traverse) => walk_on(traverse, frame, values),
+            Backend::Project(sweep) => project_by(sweep, frame, values),
             Backend::ProjectOnDevice(project) => project_on(project, frame, values),
         }
     }
@@ -159,7 +175,33 @@ fn walk_on<const N: usize>(traverse: &mut Traverse, frame: &Frame, values: &Valu
     unfinished.iter().zip(by_cpu).for_each(|(&i, p)| drawn.pixels[i] = p);
     drawn.counts.unfinished = unfinished.len() as u64;
     let _ = (frame.progress)(1.0);
-    Ok(Drawn { pixels: drawn.pixels, counts: drawn.counts, device_ms: drawn.device_ms, projection: None })
+    Ok(Drawn { pixels: drawn.pixels, counts: drawn.counts, device_ms: drawn.device_ms, ..Drawn::default() })
+}
+
+fn project_by<const N: usize>(sweep: &mut Sweep, frame: &Frame, values: &Values<N>) -> Result<Drawn> {
+    if *frame.switches != Switches::default() {
+        return Err(Error::Device("the projection engine has variants on a graphics device only".into()));
+    }
+    let color = |v: &[f32; N]| frame.largest(v);
+    let (pixels, counts) = sweep.render(&sweep::Frame {
+        geometry: &frame.mesh.geometry,
+        values,
+        integral: integral(frame),
+        view: frame.view,
+        color: &color,
+        progress: frame.progress,
+    });
+    let [overlaps, gaps, boundary, dense] = counts.redrawn;
+    let sweep = SweepStats {
+        dealt_cells: counts.cells,
+        fragments: counts.fragments,
+        redrawn_overlaps: overlaps,
+        redrawn_gaps: gaps,
+        redrawn_boundary: boundary,
+        redrawn_dense: dense,
+        handed_over: counts.handed_over.map(Into::into),
+    };
+    Ok(Drawn { pixels, counts: counts.walked, sweep: Some(sweep), ..Drawn::default() })
 }
 
 fn project_on<const N: usize>(project: &mut Project, frame: &Frame, values: &Values<N>) -> Result<Drawn> {

@@ -42,6 +42,8 @@ pub struct Stats {
     pub device_ms: Option<f64>,
     /// What the projection engine did.
     pub projection: Option<ProjectionStats>,
+    /// What the projection on the CPU did.
+    pub sweep: Option<SweepStats>,
 }
 
 /// What the projection engine did in the last frame.
@@ -57,4 +59,23 @@ pub struct ProjectionStats {
     pub draw_ms: Option<f64>,
     /// Fragments that were computed, where the device counts them.
     pub fragments: Option<u64>,
+}
+
+/// What the projection on the CPU did in the last frame.
+#[derive(Debug, Clone, Default, PartialEq, Eq, serde::Serialize)]
+pub struct SweepStats {
+    /// Cells of the tiles that the image is drawn in, each as often as it is in a tile.
+    pub dealt_cells: u64,
+    /// Segments of rays in cells.
+    pub fragments: u64,
+    /// Pixels that the walk drew again, as a cell began there before the last one ended.
+    pub redrawn_overlaps: u64,
+    /// Likewise, as a part of the mesh was missing.
+    pub redrawn_gaps: u64,
+    /// Likewise, as the ray enters the mesh not as often as it leaves.
+    pub redrawn_boundary: u64,
+    /// Likewise, as light comes through cells so dense that lengths in f32 are too coarse.
+    pub redrawn_dense: u64,
+    /// Why the walk drew all of the frame, if it did.
+    pub handed_over: Option<String>,
 }

@@ -1,14 +1,16 @@
 //! A scene as its file has it: what may be written, and what is wrong with what was.
 
+use super::reader::kind;
 use super::{DepthImage, Opaque, Scalars, Scene};
 use crate::error::{Error, Result};
 use crate::field::{Association, Component};
 use crate::image::npy::Npy;
 use crate::transfer::{Convention, Emission, TransferFunction};
 use crate::view::{Blend, Camera, ClippingPlane, DepthBuffer, DepthKind, Projection, View};
-use serde::Deserialize;
-use serde::de::IgnoredAny;
-use serde_json::Value;
+use serde::de::{IgnoredAny, Visitor};
+use serde::{Deserialize, Deserializer};
+use serde_json::{Map, Value};
+use std::fmt::{self, Formatter};
 use std::path::{Path, PathBuf};
 
 /// The file as it is written.
@@ -45,7 +47,7 @@ pub(super) struct File {
     engine: Option<String>,
     device: Option<Value>,
     integral: Option<Value>,
-    projection: Option<Value>,
+    projection: Option<Map<String, Value>>,
     #[serde(rename = "gradient_array")]
     _gradient_array: Option<IgnoredAny>,
     #[serde(rename = "tol")]
@@ -69,17 +71,34 @@ enum AssociationJson {
     Cell,
 }
 
-#[derive(Deserialize)]
-#[serde(untagged, expecting = "the component is an index from 0, or \"magnitude\"")]
 enum ComponentJson {
     Index(usize),
-    Name(ComponentName),
+    Magnitude,
 }
 
-#[derive(Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum ComponentName {
-    Magnitude,
+impl<'de> Deserialize<'de> for ComponentJson {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        struct Either;
+        impl Visitor<'_> for Either {
+            type Value = ComponentJson;
+
+            fn expecting(&self, f: &mut Formatter) -> fmt::Result {
+                f.write_str("an index from 0, or \"magnitude\",")
+            }
+
+            fn visit_u64<E: serde::de::Error>(self, index: u64) -> Result<ComponentJson, E> {
+                usize::try_from(index).map(ComponentJson::Index).map_err(E::custom)
+            }
+
+            fn visit_str<E: serde::de::Error>(self, name: &str) -> Result<ComponentJson, E> {
+                match name {
+                    "magnitude" => Ok(ComponentJson::Magnitude),
+                    _ => Err(E::invalid_value(serde::de::Unexpected::Str(name), &self)),
+                }
+            }
+        }
+        from.deserialize_any(Either)
+    }
 }
 
 /// Both are drawn split: curved cells are not drawn as such yet.
@@ -159,51 +178,17 @@ enum DepthKindJson {
     Ray,
 }
 
-/// Refuses lists where an object is meant, of which serde would take the items for its keys in sequence, and null,
-/// which it would take for a key that is not there.
-pub(super) fn check(scene: &Value) -> Result<(), String> {
-    let Value::Object(keys) = scene else { return Err("a scene is an object".into()) };
-    let object = |at: &str, value: &Value| {
-        if value.is_object() { Ok(()) } else { Err(format!("{at}: an object is meant, and not {}", kind(value))) }
-    };
-    for (key, value) in keys {
-        // What is for others may be anything.
-        if !["widgets", "gradient_array", "tol", "truth_of"].contains(&key.as_str()) {
-            refuse_null(key, value)?;
-        }
-        match (key.as_str(), value) {
-            ("scalars" | "camera" | "depth" | "projection", _) => object(key, value)?,
-            ("integral", Value::String(_)) => {}
-            ("integral", _) => object(key, value).map_err(|e| e + "; or the name of a form")?,
-            ("clipping_planes" | "opaque", Value::Array(items)) => {
-                for (i, item) in items.iter().enumerate() {
-                    object(&format!("{key}[{i}]"), item)?;
-                }
-            }
-            _ => {}
-        }
-    }
-    Ok(())
-}
-
-fn refuse_null(at: &str, value: &Value) -> Result<(), String> {
-    match value {
-        Value::Null => Err(format!("{at}: null says nothing; leave the key out")),
-        Value::Array(items) => items.iter().enumerate().try_for_each(|(i, v)| refuse_null(&format!("{at}[{i}]"), v)),
-        Value::Object(keys) => keys.iter().try_for_each(|(k, v)| refuse_null(&format!("{at}.{k}"), v)),
-        _ => Ok(()),
+/// Refuses colours with a component beyond 0 to 1.
+fn check_color(at: &str, color: &[f64]) -> Result<(), String> {
+    match color.iter().find(|c| !(0.0..=1.0).contains(*c)) {
+        Some(c) => Err(format!("{at}: red, green and blue are 0 to 1, and one is {c}")),
+        None => Ok(()),
     }
 }
 
-fn kind(value: &Value) -> &'static str {
-    match value {
-        Value::Null => "null",
-        Value::Bool(_) => "true or false",
-        Value::Number(_) => "a number",
-        Value::String(_) => "a text",
-        Value::Array(_) => "a list",
-        Value::Object(_) => "an object",
-    }
+/// Refuses a text that is empty, or of blanks.
+fn check_name(at: &str, name: &str) -> Result<(), String> {
+    if name.trim().is_empty() { Err(format!("{at}: the name is empty")) } else { Ok(()) }
 }
 
 impl File {
@@ -214,14 +199,9 @@ impl File {
             let what = "widgets: bivariate transfer functions are not drawn yet; use color and opacity";
             return Err(Error::unsupported(path, what));
         }
+        self.check().map_err(malformed)?;
         let transfer = self.transfer().map_err(malformed)?;
         let camera = self.camera.camera().map_err(malformed)?;
-        if let Some(c) = self.background.filter(|c| !c.iter().all(|v| (0.0..=1.0).contains(v))) {
-            return Err(malformed(format!("background: {c:?} is not in 0 to 1")));
-        }
-        for (i, object) in self.opaque.iter().enumerate() {
-            object.check().map_err(|what| malformed(format!("opaque[{i}]: {what}")))?;
-        }
         let folder = path.parent().unwrap_or(Path::new(""));
         let depth = self.depth.map(|depth| depth.image(folder)).transpose()?;
         let scene = Scene {
@@ -247,7 +227,7 @@ impl File {
             engine: self.engine,
             device: self.device,
             integral: self.integral,
-            projection: self.projection,
+            projection: self.projection.map(Value::Object),
         };
         // Whatever is wrong with the view is the file's mistake, and is best said before the mesh is read.
         View::new(scene.camera, scene.size)
@@ -255,6 +235,33 @@ impl File {
             .and_then(|v| scene.clipping_range.map_or(Ok(v.clone()), |r| v.with_clipping_range(r)))
             .map_err(|e| malformed(e.to_string()))?;
         Ok(scene)
+    }
+
+    /// Says what is wrong with names, colours and the like, if anything.
+    fn check(&self) -> Result<(), String> {
+        check_name("mesh", &self.mesh.to_string_lossy())?;
+        check_name("scalars.name", &self.scalars.name)?;
+        if let Some(depth) = &self.depth {
+            check_name("depth.file", &depth.file.to_string_lossy())?;
+        }
+        for (key, name) in
+            [("engine", self.engine.as_deref()), ("device", self.device.as_ref().and_then(Value::as_str))]
+        {
+            name.map_or(Ok(()), |name| check_name(key, name))?;
+        }
+        for (i, knot) in self.color.iter().flatten().enumerate() {
+            check_color(&format!("color[{i}]"), &knot[1..])?;
+        }
+        if let Some(color) = &self.background {
+            check_color("background", color)?;
+        }
+        for (i, object) in self.opaque.iter().enumerate() {
+            check_color(&format!("opaque[{i}].color"), object.color())?;
+        }
+        match &self.integral {
+            None | Some(Value::Object(_) | Value::String(_)) => Ok(()),
+            Some(other) => Err(format!("integral: an object is meant, or the name of a form, and not {}", kind(other))),
+        }
     }
 
     /// Takes the transfer function, or says what is wrong with it.
@@ -294,7 +301,7 @@ impl From<ScalarsJson> for Scalars {
             }),
             component: scalars.component.map(|c| match c {
                 ComponentJson::Index(i) => Component::Index(i),
-                ComponentJson::Name(ComponentName::Magnitude) => Component::Magnitude,
+                ComponentJson::Magnitude => Component::Magnitude,
             }),
         }
     }
@@ -303,6 +310,12 @@ impl From<ScalarsJson> for Scalars {
 impl CameraJson {
     /// The camera, or what is wrong with it.
     fn camera(&self) -> Result<Camera, String> {
+        if let Some(angle) = self.view_angle.filter(|a| !(*a > 0.0 && *a < 180.0)) {
+            return Err(format!("camera.view_angle: {angle} degrees are not between 0 and 180"));
+        }
+        if let Some(scale) = self.parallel_scale.filter(|s| *s <= 0.0) {
+            return Err(format!("camera.parallel_scale: {scale} is no half height of a view, which is above 0"));
+        }
         let projection = match (&self.projection, self.view_angle, self.parallel_scale) {
             (ProjectionJson::Perspective, angle, _) => Projection::Perspective { view_angle: angle.unwrap_or(30.0) },
             (ProjectionJson::Parallel, _, Some(parallel_scale)) => Projection::Parallel { parallel_scale },

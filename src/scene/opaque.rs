@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 /// An opaque object.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(tag = "type", rename_all = "lowercase", deny_unknown_fields)]
+#[serde(try_from = "Written")]
 pub enum Opaque {
     /// An infinite plane.
     Plane {
@@ -15,7 +15,6 @@ pub enum Opaque {
         /// Its normal, of any length but 0.
         normal: [f64; 3],
         /// Its colour, in [0, 1].
-        #[serde(default = "white")]
         color: [f64; 3],
     },
     /// A sphere, seen from outside or inside.
@@ -25,18 +24,15 @@ pub enum Opaque {
         /// Its radius, in world units.
         radius: f64,
         /// Its colour, in [0, 1].
-        #[serde(default = "white")]
         color: [f64; 3],
     },
 }
 
 impl Opaque {
-    /// Says what is wrong with it, if anything.
-    pub(super) fn check(&self) -> Result<(), &'static str> {
-        match *self {
-            Opaque::Plane { normal, .. } if normal == [0.0; 3] => Err("the normal is zero"),
-            Opaque::Sphere { radius, .. } if radius <= 0.0 => Err("the radius is not above 0"),
-            _ => Ok(()),
+    /// Its colour.
+    pub(super) fn color(&self) -> &[f64; 3] {
+        match self {
+            Opaque::Plane { color, .. } | Opaque::Sphere { color, .. } => color,
         }
     }
 
@@ -60,6 +56,58 @@ impl Opaque {
     }
 }
 
-fn white() -> [f64; 3] {
-    [1.0; 3]
+/// An object as a scene's file has it: what kinds have in common, and what they have not.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    #[serde(rename = "type")]
+    kind: Kind,
+    point: Option<[f64; 3]>,
+    normal: Option<[f64; 3]>,
+    center: Option<[f64; 3]>,
+    radius: Option<f64>,
+    color: Option<[f64; 3]>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Kind {
+    Plane,
+    Sphere,
+}
+
+impl TryFrom<Written> for Opaque {
+    type Error = String;
+
+    fn try_from(written: Written) -> Result<Self, String> {
+        let Written { kind, point, normal, center, radius, color } = written;
+        let color = color.unwrap_or([1.0; 3]);
+        let missing = |key: &str| format!("the key \"{key}\" is missing");
+        let strange = |what: &str, keys: [(&str, bool); 2]| match keys.iter().find(|key| key.1) {
+            Some((key, _)) => Err(format!("a {what} has no key \"{key}\"")),
+            None => Ok(()),
+        };
+        match kind {
+            Kind::Plane => {
+                strange("plane", [("center", center.is_some()), ("radius", radius.is_some())])?;
+                let point = point.ok_or_else(|| missing("point"))?;
+                let normal = normal.ok_or_else(|| missing("normal"))?;
+                if normal == [0.0; 3] {
+                    Err("the normal is zero".into())
+                } else {
+                    Ok(Opaque::Plane { point, normal, color })
+                }
+            }
+            Kind::Sphere => {
+                strange("sphere", [("point", point.is_some()), ("normal", normal.is_some())])?;
+                let center = center.ok_or_else(|| missing("center"))?;
+                let radius = radius.ok_or_else(|| missing("radius"))?;
+                if radius > 0.0 {
+                    Ok(Opaque::Sphere { center, radius, color })
+                } else {
+                    Err("the radius is not above 0".into())
+                }
+            }
+        }
+    }
 }

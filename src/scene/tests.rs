@@ -96,20 +96,30 @@ fn opaque_objects_end_rays() {
 #[test]
 fn mistakes_are_named() {
     for (from, to, parts) in [
-        ("\"mesh\"", "\"mash\"", vec!["mash", "unknown field", "`mesh`"]),
-        ("\"view_up\"", "\"up\"", vec!["camera", "unknown field `up`"]),
-        ("[1, 0.9, 0.3, 0.1]", "[1, 0.9, 0.3]", vec!["color[1]", "length 3"]),
-        ("[1, 0.9, 0.3, 0.1]", "[1, 0.9, 0.3, 0.1, 1]", vec!["color[1]"]),
-        ("\"s\"", "7", vec!["scalars.name", "7"]),
+        ("\"mesh\"", "\"mash\"", vec!["mash", "no key", "mesh, scalars"]),
+        ("\"view_up\"", "\"up\"", vec!["camera: there is no key \"up\""]),
+        ("[1, 0.9, 0.3, 0.1]", "[1, 0.9, 0.3]", vec!["color[1]: a list of 4 is meant, and not of 3"]),
+        ("[1, 0.9, 0.3, 0.1]", "[1, 0.9, 0.3, 0.1, 1]", vec!["color[1]: a list of 4 is meant, and not of 5"]),
+        ("[1, 0.9, 0.3, 0.1]", "[1, 230, 0.3, 0.1]", vec!["color[1]", "0 to 1", "230"]),
+        ("[1, 0.9, 0.3, 0.1]", "[1, -0.9, 0.3, 0.1]", vec!["color[1]", "-0.9"]),
+        ("[1, 0.9, 0.3, 0.1]", "7", vec!["color[1]: a list of 4 is meant, and not 7"]),
+        ("[[0, 0], [1, 0.5]]", "true", vec!["opacity: a list is meant, and not true"]),
+        ("[[0, 0], [1, 0.5]]", "[[0, \"a\"], [1, 0.5]]", vec!["opacity[0][1]: a number is meant, and not \"a\""]),
+        ("\"s\"", "7", vec!["scalars.name: a text is meant, and not 7"]),
+        ("\"s\"", "\"\"", vec!["scalars.name", "empty"]),
+        ("\"sub/ball.vtu\"", "\" \"", vec!["mesh", "empty"]),
+        ("\"size\"", "\"device\": \"\", \"size\"", vec!["device", "empty"]),
+        ("\"size\"", "\"depth\": {\"file\": \"\"}, \"size\"", vec!["depth.file", "empty"]),
         ("\"component\": 1", "\"component\": \"x\"", vec!["scalars.component", "magnitude"]),
         ("\"cell\"", "\"edge\"", vec!["scalars.association", "edge", "point"]),
         (", \"opacity\": [[0, 0], [1, 0.5]]", "", vec!["color but no opacity"]),
         ("\"color\": [[0, 0.2, 0.3, 0.8], [1, 0.9, 0.3, 0.1]],", "", vec!["opacity but no color"]),
-        ("\"unit_distance\": 0.1,", "", vec!["missing field `unit_distance`"]),
+        ("\"unit_distance\": 0.1,", "", vec!["the key \"unit_distance\" is missing"]),
         ("\"unit_distance\": 0.1", "\"unit_distance\": 0", vec!["unit distance"]),
         ("[[0, 0], [1, 0.5]]", "[[1, 0], [0, 0.5]]", vec!["ascend"]),
         ("[3, 5]", "[0, 5]", vec!["0x5"]),
-        ("[3, 5]", "[3.5, 5]", vec!["size"]),
+        ("[3, 5]", "[3.5, 5]", vec!["size[0]: a whole number from 0 is meant, and not 3.5"]),
+        ("[3, 5]", "[3, -5]", vec!["size[1]: a whole number from 0 is meant, and not -5"]),
         ("\"view_up\": [0, 1, 0]", "\"view_up\": [0, 0, 1]", vec!["view up"]),
         ("\"size\"", "\"engine\": 1, \"size\"", vec!["engine"]),
         ("\"size\"", "\"emission_scale\": 1, \"size\"", vec!["emission_scale"]),
@@ -118,11 +128,60 @@ fn mistakes_are_named() {
         ("\"size\"", "\"depth\": {\"file\": \"no.npy\"}, \"size\"", vec!["no.npy"]),
         ("\"size\"", "\"opaque\": [{\"type\": \"cone\"}], \"size\"", vec!["opaque[0]", "cone"]),
         ("\"size\"", "\"opaque\": [{\"type\": \"sphere\", \"radius\": 1}], \"size\"", vec!["opaque[0]", "center"]),
-        ("[3, 5]\n}", "[3, 5]\n} x", vec!["after the scene"]),
-        ("[3, 5]\n}", "[3, 5]", vec!["EOF"]),
+        (
+            "\"size\"",
+            "\"opaque\": [{\"type\": \"sphere\", \"center\": [0, 0, 0]}], \"size\"",
+            vec!["opaque[0]", "radius"],
+        ),
+        (
+            "\"size\"",
+            "\"opaque\": [{\"type\": \"sphere\", \"center\": [0, 0, 0], \"radius\": \"x\"}], \"size\"",
+            vec!["opaque[0].radius: a number is meant"],
+        ),
+        (
+            "\"size\"",
+            "\"opaque\": [{\"type\": \"plane\", \"point\": [0, 0, 0], \"normal\": [0, 0, 1], \"radius\": 1}], \"size\"",
+            vec!["opaque[0]: a plane has no key \"radius\""],
+        ),
+        (
+            "\"size\"",
+            "\"opaque\": [{\"type\": \"plane\", \"point\": [0, 0, 0], \"normal\": [0, 0, 1], \"color\": [2, 0, 0]}], \"size\"",
+            vec!["opaque[0].color", "2"],
+        ),
+        (
+            "\"camera\": {",
+            "\"camera\": {\"projection\": \"parallel\", \"parallel_scale\": -2, ",
+            vec!["camera.parallel_scale", "-2"],
+        ),
+        (
+            "\"camera\": {",
+            "\"camera\": {\"projection\": \"parallel\", \"parallel_scale\": 0, ",
+            vec!["camera.parallel_scale: 0"],
+        ),
+        ("\"camera\": {", "\"camera\": {\"parallel_scale\": 0, ", vec!["camera.parallel_scale: 0"]),
+        ("\"camera\": {", "\"camera\": {\"view_angle\": 180, ", vec!["camera.view_angle: 180"]),
+        (
+            "\"camera\": {",
+            "\"camera\": {\"projection\": \"fish\", ",
+            vec!["camera.projection", "fish", "perspective, parallel"],
+        ),
+        ("\"size\"", "\"clamp\": 1, \"size\"", vec!["clamp: true or false is meant, and not 1"]),
+        ("\"size\"", "\"blend\": 1, \"size\"", vec!["blend: one of composite, maximum is meant, and not 1"]),
+        ("\"size\"", "\"mesh\": \"a\", \"size\"", vec!["line 5", "\"mesh\" is there twice"]),
+        ("[3, 5]\n}", "[3, 5]\n} x", vec!["line 6, column 3", "after the scene"]),
+        ("[3, 5]\n}", "[3, 5]", vec!["line 5, column", "the file ends"]),
+        ("[3, 5]\n}", "[3, 5],\n}", vec!["line 6, column 1", "\",\" with nothing after it"]),
+        ("\"unit_distance\": 0.1", "\"unit_distance\": ,", vec!["line 3, column", "a value is missing"]),
+        ("\"unit_distance\": 0.1", "\"unit_distance\" 0.1", vec!["line 3, column", "\":\""]),
+        ("\"unit_distance\": 0.1", "unit_distance: 0.1", vec!["line 3, column", "double quotes"]),
+        ("\"unit_distance\": 0.1", "\"unit_distance\": nan", vec!["line 3, column", "no value"]),
+        ("\"unit_distance\": 0.1", "\"unit_distance\": 1e999", vec!["line 3, column", "too large"]),
     ] {
         let message = open(from, to).unwrap_err().to_string();
         assert!(parts.iter().all(|p| message.contains(p)), "{parts:?}: {message}");
+        for strange in ["expected", "f64", "u32", "struct", "enum", "variant", "field", "invalid", "?:", "`", "JSON"] {
+            assert!(!message.contains(strange), "{strange}: {message}");
+        }
     }
     let widgets = with(r#""widgets": [{"type": "uniform"}]"#).unwrap_err();
     assert!(matches!(&widgets, Error::Unsupported { what, .. } if what.contains("widgets")), "{widgets}");

@@ -1,5 +1,8 @@
 //! Colour maps: those with a name, and ParaView's presets from a file.
 
+mod named;
+
+use super::Axis;
 use super::space::Space;
 use crate::error::{Error, Result};
 use serde::Deserialize;
@@ -10,10 +13,13 @@ use std::path::Path;
 pub struct ColorMap {
     points: Vec<(f64, [f64; 3])>,
     opacity: Option<Vec<(f64, f64)>>,
+    /// Whether places are of the values' logarithms.
+    log: bool,
 }
 
-/// The names that [`ColorMap::named`] knows.
-pub const NAMES: [&str; 4] = ["viridis", "inferno", "cool to warm", "grey"];
+/// The names that [`ColorMap::named`] knows; each may have `_r` behind it.
+pub const NAMES: [&str; 10] =
+    ["viridis", "plasma", "inferno", "magma", "cividis", "turbo", "twilight", "jet", "cool to warm", "grey"];
 
 /// How far a resampled preset may be from the original, in a component of RGB or in opacity.
 const TOLERANCE: f64 = 1e-4;
@@ -22,25 +28,44 @@ const TOLERANCE: f64 = 1e-4;
 const TOLERANCE_NAMED: f64 = 1.0 / 255.0;
 
 impl ColorMap {
-    /// One of [`NAMES`]; case, and whether words are joined by spaces, `-` or `_`, do not matter.
+    /// One of [`NAMES`], accurate to 1/255; with `_r` behind it, from its end to its beginning. Case, and whether words
+    /// are joined by spaces, `-` or `_`, do not matter.
     ///
     /// # Errors
     /// [`Error::Transfer`], with the names that exist.
     pub fn named(name: &str) -> Result<Self> {
-        let table = |t: &[[f64; 4]]| t.iter().map(|&[s, r, g, b]| (s / 255.0, [r, g, b])).collect::<Vec<_>>();
-        let points = match name.to_lowercase().replace(['-', '_'], " ").as_str() {
-            "viridis" => table(&VIRIDIS),
-            "inferno" => table(&INFERNO),
+        let words = name.to_lowercase().replace(['-', '_'], " ");
+        let (word, reversed) = match words.strip_suffix(" r") {
+            Some(word) => (word, true),
+            None => (words.as_str(), false),
+        };
+        let points = match word {
             "cool to warm" | "coolwarm" => resample(0.0, 1.0, TOLERANCE_NAMED, &|u| {
                 Space::Diverging.mix([0.231373, 0.298039, 0.752941], [0.705882, 0.0156863, 0.14902], u)
             }),
             "grey" | "gray" | "grayscale" | "greyscale" => vec![(0.0, [0.0; 3]), (1.0, [1.0; 3])],
-            _ => {
+            _ => named::table(word).ok_or_else(|| {
                 let names = NAMES.join("\", \"");
-                return Err(Error::Transfer(format!("no colour map is called \"{name}\"; there are \"{names}\"")));
-            }
+                Error::Transfer(format!(
+                    "no colour map is called \"{name}\"; there are \"{names}\", each also with _r, reversed"
+                ))
+            })?,
         };
-        Ok(ColorMap { points, opacity: None })
+        let map = ColorMap { points, opacity: None, log: false };
+        Ok(if reversed { map.reversed() } else { map })
+    }
+
+    /// One colour, whose components are in [0, 1].
+    pub fn solid(color: [f64; 3]) -> Self {
+        ColorMap { points: vec![(0.0, color), (1.0, color)], opacity: None, log: false }
+    }
+
+    /// The map from its end to its beginning; so is the opacity that came with it.
+    pub fn reversed(&self) -> Self {
+        fn turned<T: Copy>(points: &[(f64, T)]) -> Vec<(f64, T)> {
+            points.iter().rev().map(|&(x, v)| (1.0 - x, v)).collect()
+        }
+        ColorMap { points: turned(&self.points), opacity: self.opacity.as_deref().map(turned), log: self.log }
     }
 
     /// Reads a preset that ParaView saved (.json): the one called `preset`, or the first in the file.
@@ -71,7 +96,8 @@ impl ColorMap {
         }
         let space = match file.color_space.as_deref().unwrap_or("RGB") {
             "RGB" => Space::Rgb,
-            "HSV" => Space::Hsv,
+            // ParaView's default, unlike VTK's, is not to.
+            "HSV" => Space::Hsv { wrap: file.hsv_wrap.is_some_and(Flag::is_set) },
             "Lab" => Space::Lab,
             "Diverging" => Space::Diverging,
             "Step" => Space::Step,
@@ -81,13 +107,19 @@ impl ColorMap {
                 return Err(Error::unsupported(path, what));
             }
         };
-        let colors = tuples::<3>(&file.rgb_points).map_err(|e| malformed(format!("{what}: RGBPoints {e}")))?;
+        for (name, value) in chosen.as_object().into_iter().flatten() {
+            if !KNOWN.contains(&name.as_str()) && !is_unset(value) {
+                tracing::warn!("{}: {what} says {name}: {value}, which Halite does not do", path.display());
+            }
+        }
+        let log = file.use_log_scale.is_some_and(Flag::is_set);
+        let colors = tuples::<3>(&file.rgb_points, log).map_err(|e| malformed(format!("{what}: RGBPoints {e}")))?;
         let opacity = file
             .points
-            .map(|p| tuples::<3>(&p).map_err(|e| malformed(format!("{what}: Points {e}"))))
+            .map(|p| tuples::<3>(&p, log).map_err(|e| malformed(format!("{what}: Points {e}"))))
             .transpose()?
             .map(|p| opacity_points(&p));
-        Ok(ColorMap { points: color_points(&colors, space), opacity })
+        Ok(ColorMap { points: color_points(&colors, space), opacity, log })
     }
 
     /// The points `(place in [0, 1], [r, g, b])`, ascending.
@@ -95,14 +127,26 @@ impl ColorMap {
         &self.points
     }
 
-    /// The knots of a colour function that has this map over the range from `lo` to `hi`.
-    pub fn over(&self, [lo, hi]: [f64; 2]) -> Vec<(f64, [f64; 3])> {
-        self.points.iter().map(|&(x, c)| (lo + (hi - lo) * x, c)).collect()
+    /// The points `(place in [0, 1], opacity)` of the opacity function that came with a preset.
+    pub fn opacity(&self) -> Option<&[(f64, f64)]> {
+        self.opacity.as_deref()
     }
 
-    /// The knots of the opacity function that came with a preset, over the range from `lo` to `hi`.
-    pub fn opacity_over(&self, [lo, hi]: [f64; 2]) -> Option<Vec<(f64, f64)>> {
-        Some(self.opacity.as_ref()?.iter().map(|&(x, a)| (lo + (hi - lo) * x, a)).collect())
+    /// How the map's places lie on a range: evenly in the logarithms if the preset says so and both ends are above 0, and
+    /// else, with a warning, evenly.
+    pub fn axis(&self, range: [f64; 2]) -> Axis {
+        if self.log {
+            match Axis::logarithmic(range) {
+                Ok(axis) => return axis,
+                Err(e) => tracing::warn!("the colour map is for logarithms, and is drawn without: {e}"),
+            }
+        }
+        Axis::linear(range)
+    }
+
+    /// The knots of a colour function that has this map over a range of scalars; see [`Self::axis`].
+    pub fn over(&self, range: [f64; 2]) -> Vec<(f64, [f64; 3])> {
+        self.axis(range).knots(&self.points, TOLERANCE)
     }
 }
 
@@ -115,10 +159,66 @@ struct Preset {
     color_space: Option<String>,
     points: Option<Vec<f64>>,
     indexed_colors: Option<serde::de::IgnoredAny>,
+    #[serde(rename = "HSVWrap")]
+    hsv_wrap: Option<Flag>,
+    use_log_scale: Option<Flag>,
 }
 
-/// A list (s, N numbers, s, …) as points over [0, 1].
-fn tuples<const N: usize>(list: &[f64]) -> Result<Vec<(f64, [f64; N])>, String> {
+/// What a preset may say that Halite does, or that changes no picture of values that are finite.
+const KNOWN: [&str; 19] = [
+    "RGBPoints",
+    "ColorSpace",
+    "Points",
+    "IndexedColors",
+    "HSVWrap",
+    "UseLogScale",
+    "Name",
+    "Creator",
+    "Author",
+    "License",
+    "Source",
+    "Category",
+    "Groups",
+    "Tags",
+    "DefaultMap",
+    "NanColor",
+    "NanOpacity",
+    "AllowDuplicateScalars",
+    "AutomaticRescaleRangeMode",
+];
+
+/// Yes or no, as ParaView writes it.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(untagged)]
+enum Flag {
+    Bool(bool),
+    Number(f64),
+    List([f64; 1]),
+}
+
+impl Flag {
+    fn is_set(self) -> bool {
+        match self {
+            Flag::Bool(set) => set,
+            Flag::Number(n) | Flag::List([n]) => n != 0.0,
+        }
+    }
+}
+
+/// Whether a property's value is one that says nothing: no, none, or an empty list.
+fn is_unset(value: &serde_json::Value) -> bool {
+    match value {
+        serde_json::Value::Null => true,
+        serde_json::Value::Bool(set) => !set,
+        serde_json::Value::Number(n) => n.as_f64() == Some(0.0),
+        serde_json::Value::String(s) => s.is_empty(),
+        serde_json::Value::Array(list) => list.iter().all(is_unset),
+        serde_json::Value::Object(list) => list.is_empty(),
+    }
+}
+
+/// A list (s, N numbers, s, …) as points over [0, 1]; if `log`, of the logarithms, if they have such.
+fn tuples<const N: usize>(list: &[f64], log: bool) -> Result<Vec<(f64, [f64; N])>, String> {
     if list.is_empty() || !list.len().is_multiple_of(N + 1) {
         return Err(format!("holds {} numbers, not {} for each point", list.len(), N + 1));
     }
@@ -129,6 +229,9 @@ fn tuples<const N: usize>(list: &[f64]) -> Result<Vec<(f64, [f64; N])>, String> 
     let mut points: Vec<(f64, [f64; N])> = points.collect();
     if let Some(i) = points.windows(2).position(|w| w[1].0 < w[0].0) {
         return Err(format!("decreases from {} to {}", points[i].0, points[i + 1].0));
+    }
+    if log && points[0].0 > 0.0 {
+        points.iter_mut().for_each(|p| p.0 = p.0.ln());
     }
     let (lo, hi) = (points[0].0, points[points.len() - 1].0);
     for p in &mut points {
@@ -217,31 +320,6 @@ fn resample<const N: usize>(x0: f64, x1: f64, tolerance: f64, f: &dyn Fn(f64) ->
     out.into_iter().map(|(u, c)| (if u == 1.0 { x1 } else { x0 + (x1 - x0) * u }, c)).collect()
 }
 
-/// Points `[255 x, r, g, b]` of matplotlib's table of 256 (CC0; S. van der Walt, N. Smith, E. Firing), chosen so that
-/// the lines between them miss it by at most 1/255.
-#[rustfmt::skip]
-const VIRIDIS: [[f64; 4]; 16] = [
-    [0.0, 0.2670, 0.0049, 0.3294], [19.0, 0.2831, 0.1106, 0.4316], [36.0, 0.2752, 0.1949, 0.4960],
-    [54.0, 0.2486, 0.2788, 0.5346], [81.0, 0.1976, 0.3915, 0.5550], [122.0, 0.1351, 0.5449, 0.5540],
-    [141.0, 0.1195, 0.6148, 0.5377], [153.0, 0.1347, 0.6586, 0.5176], [164.0, 0.1757, 0.6979, 0.4910],
-    [177.0, 0.2529, 0.7422, 0.4483], [193.0, 0.3778, 0.7918, 0.3779], [213.0, 0.5655, 0.8424, 0.2629],
-    [235.0, 0.7938, 0.8807, 0.1200], [242.0, 0.8660, 0.8899, 0.0960], [248.0, 0.9261, 0.8973, 0.1041],
-    [255.0, 0.9932, 0.9062, 0.1439],
-];
-
-/// As [`VIRIDIS`].
-#[rustfmt::skip]
-const INFERNO: [[f64; 4]; 22] = [
-    [0.0, 0.0015, 0.0005, 0.0139], [5.0, 0.0077, 0.0061, 0.0468], [15.0, 0.0377, 0.0259, 0.1322],
-    [28.0, 0.1046, 0.0470, 0.2534], [39.0, 0.1765, 0.0414, 0.3481], [47.0, 0.2315, 0.0364, 0.3924],
-    [58.0, 0.3036, 0.0494, 0.4222], [75.0, 0.4101, 0.0879, 0.4331], [95.0, 0.5347, 0.1325, 0.4167],
-    [115.0, 0.6585, 0.1790, 0.3727], [137.0, 0.7859, 0.2471, 0.2955], [156.0, 0.8780, 0.3321, 0.2123],
-    [174.0, 0.9415, 0.4364, 0.1254], [192.0, 0.9784, 0.5579, 0.0349], [198.0, 0.9846, 0.6011, 0.0236],
-    [203.0, 0.9873, 0.6379, 0.0349], [211.0, 0.9871, 0.6979, 0.0877], [223.0, 0.9761, 0.7900, 0.1960],
-    [233.0, 0.9587, 0.8666, 0.3108], [241.0, 0.9468, 0.9242, 0.4264], [248.0, 0.9545, 0.9659, 0.5404],
-    [255.0, 0.9884, 0.9984, 0.6449],
-];
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -267,13 +345,45 @@ mod tests {
         close(color(&ColorMap::named("Viridis").unwrap(), 128.0 / 255.0), [0.127568, 0.566949, 0.550556], 1.0 / 255.0);
         close(color(&ColorMap::named("inferno").unwrap(), 64.0 / 255.0), [0.341500, 0.062325, 0.429425], 1.0 / 255.0);
         close(color(&ColorMap::named("gray").unwrap(), 0.3), [0.3; 3], 1e-12);
-        let message = ColorMap::named("jet").unwrap_err().to_string();
-        assert!(message.contains("jet") && message.contains("viridis"), "{message}");
+        close(color(&ColorMap::named("grey_r").unwrap(), 0.3), [0.7; 3], 1e-12);
+        let message = ColorMap::named("bone").unwrap_err().to_string();
+        assert!(message.contains("bone") && message.contains("viridis"), "{message}");
         for name in NAMES {
+            let (map, turned) = (ColorMap::named(name).unwrap(), ColorMap::named(&format!("{name}_r")).unwrap());
+            for x in [0.0, 0.11, 0.4, 0.77, 1.0] {
+                close(color(&turned, x), color(&map, 1.0 - x), 1e-12);
+            }
             let knots = ColorMap::named(name).unwrap().over([-2.0, 6.0]);
             assert_eq!((knots[0].0, knots[knots.len() - 1].0), (-2.0, 6.0));
             assert!(knots.len() < 40, "{name} has {} knots", knots.len());
             TransferFunction::new(knots, vec![(0.0, 1.0)], 1.0).unwrap();
+        }
+    }
+
+    /// Entries of matplotlib 3.11's tables, which have 256 or (twilight) 510 of them; its jet between them.
+    #[test]
+    fn maps_are_matplotlibs() {
+        for (name, x, wanted) in [
+            ("viridis", 89.0 / 255.0, [0.183898, 0.422383, 0.556944]),
+            ("viridis", 222.0 / 255.0, [0.657642, 0.860219, 0.203082]),
+            ("plasma", 26.0 / 255.0, [0.261183, 0.013308, 0.617911]),
+            ("plasma", 158.0 / 255.0, [0.896131, 0.415712, 0.366407]),
+            ("inferno", 89.0 / 255.0, [0.497257, 0.119379, 0.424488]),
+            ("inferno", 222.0 / 255.0, [0.977497, 0.782258, 0.185923]),
+            ("magma", 26.0 / 255.0, [0.083446, 0.056225, 0.220755]),
+            ("magma", 158.0 / 255.0, [0.8947, 0.309773, 0.393995]),
+            ("cividis", 89.0 / 255.0, [0.356418, 0.375896, 0.430823]),
+            ("cividis", 222.0 / 255.0, [0.862105, 0.782494, 0.350011]),
+            ("turbo", 26.0 / 255.0, [0.27103, 0.35926, 0.81156]),
+            ("turbo", 158.0 / 255.0, [0.92004, 0.82806, 0.22456]),
+            ("twilight", 178.0 / 509.0, [0.362876, 0.225841, 0.618804]),
+            ("twilight", 443.0 / 509.0, [0.796939, 0.626849, 0.519626]),
+            ("jet", 0.1, [0.0, 0.0, 0.5 + 0.5 / 0.11 * 0.1]),
+            ("jet", 0.3, [0.0, 0.7, 1.0]),
+            ("jet", 0.5, [0.15 / 0.31, 1.0, 0.15 / 0.31]),
+            ("jet", 0.95, [1.0 - 0.5 * 0.06 / 0.11, 0.0, 0.0]),
+        ] {
+            close(color(&ColorMap::named(name).unwrap(), x), wanted, 1.0 / 255.0);
         }
     }
 
@@ -310,13 +420,44 @@ mod tests {
         close(color(&named, 0.25), [0.553318, 0.688635, 0.995188], 1.0 / 255.0);
     }
 
+    /// What vtkColorTransferFunction 9.7 answers with HSVWrap off, as ParaView has it, and on; and with log10 scale.
+    #[test]
+    fn hue_wraps_and_values_are_logarithms_where_a_preset_says_so() {
+        let rainbow = "0, 0, 0, 1, 1, 1, 0, 0";
+        for (wrap, x, wanted) in [
+            ("", 0.25, [0.0, 1.0, 1.0]),
+            ("", 0.5, [0.0, 1.0, 0.0]),
+            (r#""HSVWrap": 0,"#, 0.75, [1.0, 1.0, 0.0]),
+            (r#""HSVWrap": 1,"#, 0.5, [1.0, 0.0, 1.0]),
+            (r#""HSVWrap": true,"#, 0.25, [0.5, 0.0, 1.0]),
+        ] {
+            let map = preset(&format!(r#"[{{"Name": "x", {wrap} "ColorSpace": "HSV", "RGBPoints": [{rainbow}]}}]"#));
+            close(color(&map.unwrap(), x), wanted, 1.1e-4);
+        }
+        let points = "1, 1, 0, 0.2, 10, 0.2, 0.3, 1, 1000, 1, 1, 0.1";
+        let map = preset(&format!(r#"[{{"Name": "x", "UseLogScale": 1, "RGBPoints": [{points}]}}]"#)).unwrap();
+        let at = |range, s| TransferFunction::new(map.over(range), vec![(0.0, 1.0)], 1.0).unwrap().color_at(s);
+        for (s, wanted) in [
+            (2.0, [0.759176, 0.090309, 0.440824]),
+            (5.0, [0.440824, 0.209691, 0.759176]),
+            (100.0, [0.6, 0.65, 0.55]),
+            (500.0, [0.879588, 0.89464, 0.235463]),
+        ] {
+            close(at([1.0, 1e3], s), wanted, 1.1e-4);
+            close(at([1e-6, 1e-3], s * 1e-6), wanted, 1.1e-4);
+        }
+        // There are no logarithms: as if it said nothing.
+        close(at([0.0, 3.0], 1.0), [0.2, 0.3, 1.0], 1e-12);
+    }
+
     /// What vtkPiecewiseFunction 9.7 answers.
     #[test]
     fn midpoint_and_sharpness_are_vtks() {
         let map = preset(
             r#"{"RGBPoints": [0,0,0,0, 1,1,1,1], "Points": [0,0.1,0.3,0.4, 1,0.9,0.5,0, 2,0,0.5,1, 3,0.5,0.5,0]}"#,
         );
-        let knots = map.unwrap().opacity_over([0.0, 3.0]).unwrap();
+        let map = map.unwrap();
+        let knots = map.axis([0.0, 3.0]).knots(map.opacity().unwrap(), TOLERANCE);
         let f = TransferFunction::new(vec![(0.0, [1.0; 3])], knots, 1.0).unwrap();
         for (s, wanted) in
             [(0.1, 0.100992), (0.3, 0.5), (0.5, 0.847593), (0.9, 0.9), (1.3, 0.63), (2.2, 0.0), (2.7, 0.5)]

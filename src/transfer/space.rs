@@ -7,8 +7,10 @@ use std::f64::consts::{PI, TAU};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Space {
     Rgb,
-    /// Hue goes the short way round.
-    Hsv,
+    /// Hue goes from one to the other as numbers do, so from blue to red by green; or, as a wheel, the short way round.
+    Hsv {
+        wrap: bool,
+    },
     Lab,
     /// Through white if the ends differ in hue (Moreland, "Diverging Color Maps for Scientific Visualization", 2009).
     Diverging,
@@ -21,9 +23,9 @@ impl Space {
     pub(super) fn mix(self, a: [f64; 3], b: [f64; 3], u: f64) -> [f64; 3] {
         match self {
             Space::Rgb => lerp(a, b, u),
-            Space::Hsv => {
+            Space::Hsv { wrap } => {
                 let (mut a, mut b) = (hsv(a), hsv(b));
-                if (a[0] - b[0]).abs() > 0.5 {
+                if wrap && (a[0] - b[0]).abs() > 0.5 {
                     if a[0] > b[0] { a[0] -= 1.0 } else { b[0] -= 1.0 }
                 }
                 rgb_of_hsv(lerp(a, b, u))

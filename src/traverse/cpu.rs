@@ -363,7 +363,9 @@ impl<'a, const N: usize> Tracer<'a, N> {
         if self.view.blend() == Blend::Composite {
             match self.integral.table {
                 None => self.batch.add(self.integral.exact, &front, &back, length as f32, &mut gathered.light),
-                Some(table) => table.add(front[N - 1], back[N - 1], length as f32, &mut gathered.light),
+                Some(table) => {
+                    table.add(self.integral.exact, front[N - 1], back[N - 1], length as f32, &mut gathered.light);
+                }
             }
         } else if front.iter().chain(&back).all(|v| v.is_finite()) {
             for v in [front, back] {

@@ -1,12 +1,13 @@
 //! Cells of every type: they fill what they should, fit to their neighbours, and use all their nodes.
 
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "helpers of tests fail like tests do")]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "helpers of tests fail like tests do")]
 
 #[path = "../common/mod.rs"]
 mod common;
 mod kinds;
 mod nodes;
 mod polyhedra;
+mod solids;
 
 use common::draw;
 use glam::{DMat3, DVec3, dvec3};

@@ -24,16 +24,16 @@ fn a_cell_of_every_type_is_filled_through_all_its_nodes() {
         // Bézier control points need not lie in the cell.
         assert!(used.iter().all(|u| *u) || what >= 78, "{what}: a node is not used");
         // What is linear at the nodes is linear at what was added.
-        let linear = |p: &DVec3| (p.dot(dvec3(0.3, -0.7, 0.2)) + 0.1) as f32;
-        let values: Vec<f32> = mesh.points().iter().flat_map(|p| [linear(p), 1.0]).collect();
-        let values = cut.tetrahedra.values(&values, 2);
+        let linear = |p: &DVec3| p.dot(dvec3(0.3, -0.7, 0.2)) + 0.1;
+        let values: Vec<f64> = mesh.points().iter().flat_map(|p| [linear(p), 1.0]).collect();
+        let values = cut.tetrahedra.values(values.into(), 2);
         for (i, p) in cut.points.iter().enumerate() {
             assert!((values[2 * i] - linear(p)).abs() < 1e-6 && (values[2 * i + 1] - 1.0).abs() < 1e-6, "{what}");
         }
         // Every value counts: moving one moves the value somewhere in the cell.
         for n in 0..mesh.points().len() {
-            let values: Vec<f32> = (0..mesh.points().len()).map(|i| if i == n { 1.0 } else { 0.0 }).collect();
-            let spread = cut.tetrahedra.values(&values, 1);
+            let values: Vec<f64> = (0..mesh.points().len()).map(|i| if i == n { 1.0 } else { 0.0 }).collect();
+            let spread = cut.tetrahedra.values(values.into(), 1);
             assert!(cut.tetrahedra.corners.iter().flatten().any(|p| spread[*p as usize] != 0.0), "{what}: node {n}");
         }
     }

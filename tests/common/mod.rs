@@ -28,6 +28,8 @@ use std::path::{Path, PathBuf};
 pub(crate) enum Engine {
     /// The traverse engine on the CPU, on so many threads.
     Twin { threads: usize },
+    /// The projection engine on the CPU, on so many threads.
+    Sweep { threads: usize },
     /// An engine on the device to test: see [`on_device`]. Draws nothing if there is none.
     Device(render::Engine),
     /// The judge itself, for the tests that know the answer without it.
@@ -35,7 +37,7 @@ pub(crate) enum Engine {
 }
 
 /// The engines under test.
-pub(crate) const ENGINES: &[Engine] = &[Engine::Twin { threads: 2 }];
+pub(crate) const ENGINES: &[Engine] = &[Engine::Twin { threads: 2 }, Engine::Sweep { threads: 2 }];
 
 /// What is drawn, but for the view.
 #[derive(Debug, Clone)]
@@ -76,6 +78,11 @@ impl Engine {
         match self {
             Engine::Twin { threads } => {
                 let mut renderer = Renderer::with_device(threads, DeviceChoice::Cpu).unwrap();
+                set(&mut renderer, scene);
+                views.iter().map(|view| renderer.render(view, &|_| ()).unwrap()).collect()
+            }
+            Engine::Sweep { threads } => {
+                let mut renderer = Renderer::with_engine(threads, DeviceChoice::Cpu, render::Engine::Project).unwrap();
                 set(&mut renderer, scene);
                 views.iter().map(|view| renderer.render(view, &|_| ()).unwrap()).collect()
             }

@@ -1,10 +1,11 @@
 use crate::render::{self, Job, Request, Times, ms};
-use crate::{output, progress};
+use crate::{camera, output, progress};
 use anyhow::{Context, Result};
 use clap::Args;
 use halite::gpu::{self, DeviceChoice};
 use halite::render::{ProjectionStats, Renderer, Stats};
 use halite::transfer::TransferFunction;
+use halite::view::View;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -13,6 +14,7 @@ use std::time::Instant;
 ///
 /// Loads once, then draws the same view several times on the chosen device, and on each other device of this machine
 /// unless one was named. Times are medians; the JSON tells those of the projection engine's passes, that of ordering by edits.
+/// With --views, each frame is seen from another side, so nothing of the last one can be used again.
 #[derive(Args)]
 pub(crate) struct Options {
     #[command(flatten)]
@@ -20,6 +22,9 @@ pub(crate) struct Options {
     /// Frames drawn on each device, besides the first
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     frames: u32,
+    /// Draw from so many sides in turn, all around the view-up axis
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    views: u32,
     /// Write the figures as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -43,6 +48,8 @@ struct Run {
     stats: Stats,
     times: Times,
     frame_ms: f64,
+    /// Of all threads, for the mean frame, where the system says.
+    frame_cpu_ms: Option<f64>,
 }
 
 pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
@@ -71,7 +78,12 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     let size = job.scene.size;
     output::print(&table(&runs, size))?;
     if let Some(path) = &options.json {
-        let reports: Vec<Value> = runs.iter().map(|r| render::report(&r.stats, &r.times, size, r.frame_ms)).collect();
+        let report = |r: &Run| {
+            let mut report = render::report(&r.stats, &r.times, size, r.frame_ms);
+            report["frame_cpu_ms"] = json!(r.frame_cpu_ms);
+            report
+        };
+        let reports: Vec<Value> = runs.iter().map(report).collect();
         let mut whole = reports[0].clone();
         whole["runs"] = json!(reports[1..]);
         std::fs::write(path, format!("{whole:#}\n")).with_context(|| path.display().to_string())?;
@@ -99,23 +111,29 @@ fn others(drew: &Stats) -> Vec<DeviceChoice> {
 }
 
 fn measure(options: &Options, job: &Job, renderer: &mut Renderer) -> Result<Run> {
-    let (view, _) = job.scene.view()?;
-    renderer.set_mesh(&job.mesh, job.tetrahedra.clone());
+    let views = (0..options.views).map(|i| {
+        let mut scene = job.scene.clone();
+        scene.camera = camera::turned(scene.camera, 360.0 * f64::from(i) / f64::from(options.views));
+        Ok(scene.view()?.0)
+    });
+    let views: Vec<View> = views.collect::<Result<_>>()?;
+    renderer.check_room(job.mesh.points().len(), &job.tetrahedra)?;
+    progress::busy("matching faces", || renderer.set_mesh(&job.mesh, job.tetrahedra.clone()));
     renderer.set_field(&job.field)?;
     renderer.set_transfer(&job.scene.transfer);
     let name = renderer.stats().adapter.clone();
     progress::during("measuring", |p| {
         let share = |done: u32| p(f64::from(done) / f64::from(2 * options.frames + 1));
-        let draw = |renderer: &mut Renderer| -> Result<f64> {
+        let draw = |renderer: &mut Renderer, i: u32| -> Result<f64> {
             let start = Instant::now();
-            renderer.render(&view, &|_| ()).with_context(|| name.clone())?;
+            renderer.render(&views[i as usize % views.len()], &|_| ()).with_context(|| name.clone())?;
             Ok(ms(start))
         };
-        let first_frame = draw(renderer)?;
+        let first_frame = draw(renderer, 0)?;
         // One that is chosen by the knots is not there yet.
         if renderer.stats().knots_per_cell > 0.0 {
             renderer.wait_for_table();
-            draw(renderer)?;
+            draw(renderer, 0)?;
         }
         let tabulated = renderer.stats().table_bytes > 0;
         let old = &job.scene.transfer;
@@ -126,33 +144,45 @@ fn measure(options: &Options, job: &Job, renderer: &mut Renderer) -> Result<Run>
             .with_emission(old.emission())?;
         let (mut frames, mut edits) = (Vec::new(), Vec::new());
         let (mut still, mut moved) = (Vec::new(), Vec::new());
+        let mut cpu_ms = Some(0.0);
         for i in 0..options.frames {
-            frames.push(draw(renderer)?);
+            let before = cpu_time_ms();
+            frames.push(draw(renderer, i)?);
+            cpu_ms = (|| Some(cpu_ms? + cpu_time_ms()? - before?))();
             still.extend(renderer.stats().projection);
             share(2 * i + 2);
             // To and fro, so that every edit is one.
             renderer.set_transfer(if i % 2 == 0 { &edited } else { &job.scene.transfer });
-            edits.push(draw(renderer)?);
+            edits.push(draw(renderer, i)?);
             moved.extend(renderer.stats().projection);
             if tabulated {
                 renderer.wait_for_table();
-                draw(renderer)?;
+                draw(renderer, i)?;
             }
             share(2 * i + 3);
         }
         // What the device did for a still view, not for an edit.
         renderer.set_transfer(&job.scene.transfer);
         renderer.wait_for_table();
-        draw(renderer)?;
-        draw(renderer)?;
+        draw(renderer, 0)?;
+        draw(renderer, 0)?;
         let times =
             Times { load: job.load_ms, split: job.split_ms, first_frame, transfer_edit: Some(median(&mut edits)) };
         let mut stats = renderer.stats().clone();
         if let Some(projection) = &mut stats.projection {
             *projection = medians(*projection, &still, &moved);
         }
-        Ok(Run { stats, times, frame_ms: median(&mut frames) })
+        let frame_cpu_ms = cpu_ms.map(|ms| ms / f64::from(options.frames));
+        Ok(Run { stats, times, frame_ms: median(&mut frames), frame_cpu_ms })
     })
+}
+
+/// What all threads of this process have computed for, in ms, in steps of the system's clock tick (10 ms on Linux).
+fn cpu_time_ms() -> Option<f64> {
+    let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
+    // The name before may hold anything; user and system time are the 12th and 13th fields after it, in ticks of 1/100 s.
+    let mut ticks = stat.rsplit_once(')')?.1.split_whitespace().skip(11).map(|n| n.parse::<f64>().ok());
+    Some(10.0 * (ticks.next()?? + ticks.next()??))
 }
 
 /// `last` with the median times of still views, but that of ordering by views after an edit.
@@ -187,7 +217,7 @@ fn table(runs: &[Run], [w, h]: [u32; 2]) -> String {
         text += &format!("{head:>width$} ");
     }
     text += " device\n";
-    for Run { stats: s, times, frame_ms } in runs {
+    for Run { stats: s, times, frame_ms, .. } in runs {
         let time = |ms: f64| format!("{ms:.1} ms");
         let cells = [
             time(s.faces_ms),

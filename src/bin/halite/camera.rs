@@ -37,7 +37,18 @@ pub(crate) struct Options {
 
 impl Options {
     /// `camera`, with what the options change.
-    pub(crate) fn apply(&self, mut camera: Camera) -> Camera {
+    pub(crate) fn apply(&self, camera: Camera) -> Camera {
+        self.zoomed(self.aimed(camera))
+    }
+
+    /// As [`Self::apply`], with the camera moved by `fill` before it is zoomed, if no option says where it is.
+    pub(crate) fn framed(&self, camera: Camera, fill: impl FnOnce(Camera) -> Camera) -> Camera {
+        let camera = self.aimed(camera);
+        let placed = self.position.is_some() || self.focal_point.is_some();
+        self.zoomed(if placed { camera } else { fill(camera) })
+    }
+
+    fn aimed(&self, mut camera: Camera) -> Camera {
         camera.position = self.position.unwrap_or(camera.position);
         camera.focal_point = self.focal_point.unwrap_or(camera.focal_point);
         camera.view_up = self.view_up.unwrap_or(camera.view_up);
@@ -54,6 +65,10 @@ impl Options {
         if let (Some(degrees), Some(right)) = (self.elevation, across.try_normalize()) {
             turn(&mut camera, right, -degrees);
         }
+        camera
+    }
+
+    fn zoomed(&self, mut camera: Camera) -> Camera {
         if let Some(zoom) = self.zoom {
             match &mut camera.projection {
                 Projection::Perspective { view_angle } => *view_angle /= zoom,
@@ -62,6 +77,14 @@ impl Options {
         }
         camera
     }
+}
+
+/// `camera`, so many `degrees` further around its view-up axis.
+pub(crate) fn turned(mut camera: Camera, degrees: f64) -> Camera {
+    if let Some(axis) = camera.view_up.try_normalize() {
+        turn(&mut camera, axis, degrees);
+    }
+    camera
 }
 
 /// Turns position and view up around the focal point.

@@ -4,7 +4,7 @@ use clap::Args;
 use halite::field::Association;
 use halite::geometry::Geometry;
 use halite::geometry::contacts::Contacts;
-use halite::mesh::cells::{self, Tetrahedra};
+use halite::mesh::cells::{self, Listed, Tetrahedra};
 use halite::mesh::faces::Faces;
 use halite::mesh::{Array, Attributes, LeftOut, Mesh, Role, Values};
 use halite::scene::automatic;
@@ -139,6 +139,7 @@ fn describe(out: &mut String, name: &str, mesh: &Mesh, (times, step): (&[f64], u
         Ok(t) => t,
         Err(e) => return Ok(writeln!(out, "  nothing: {e}")?),
     };
+    let listed = |cells: &Listed, what: &str| format!("{what} ({cells})");
     let mut row = |count: usize, what: &str| if count > 0 { writeln!(out, "  {count:>12}  {what}") } else { Ok(()) };
     let points = tetrahedra.points(mesh.points());
     let faces = Faces::new(&points, &tetrahedra.corners);
@@ -155,11 +156,14 @@ fn describe(out: &mut String, name: &str, mesh: &Mesh, (times, step): (&[f64], u
     row(skipped.ghost, "cells left out: ghosts")?;
     row(skipped.invisible, "cells left out: a point is not finite")?;
     row(skipped.empty, "cells left out: polyhedra without faces")?;
+    row(skipped.open.count, &listed(&skipped.open, "cells left out: polyhedra whose faces do not close a surface"))?;
+    row(skipped.flat.count, &listed(&skipped.flat, "cells left out: polyhedra without volume"))?;
     let inverted = faces.orientation.iter().filter(|o| **o < 0).count();
     row(inverted.min(tetrahedra.corners.len() - inverted), "tetrahedra turned inside out against the others")?;
     row(faces.degenerate, "tetrahedra with two corners at one place, left out")?;
     row(faces.flat, "tetrahedra of no volume")?;
-    row(tetrahedra.crooked, "polyhedra that no point inside sees whole: drawn with overlaps")?;
+    let crooked = &tetrahedra.crooked;
+    row(crooked.count, &listed(crooked, "polyhedra that cross themselves: drawn with overlaps"))?;
     row(faces.non_manifold, "faces of more than two tetrahedra")?;
     row(faces.folded, "faces with both tetrahedra on one side")?;
     let of = if contacts.faces < faces.boundary.len() {

@@ -2,11 +2,11 @@
 
 use crate::output::misuse;
 use crate::variant::{named, table};
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, anyhow, bail};
 use clap::Args;
 use halite::integral::choice::{Alpha, Build, Choice, Form, Planes, Texels};
 use halite::integral::table::Kind;
-use halite::scene::Scene;
+use halite::scene::{Scene, read};
 use serde_json::Value;
 use std::path::Path;
 
@@ -94,6 +94,6 @@ pub(crate) fn of_scene(scene: &Scene, path: &Path) -> Result<Choice> {
                 bail!("{}: integral: \"{name}\" is not known here; there is {known}", path.display())
             }
         },
-        Some(value) => serde_path_to_error::deserialize(value).with_context(|| format!("{}: integral", path.display())),
+        Some(value) => read(value).map_err(|what| anyhow!("{}: integral: {what}", path.display())),
     }
 }

@@ -1,11 +1,14 @@
 //! The standalone program.
 
+mod allocator;
 mod bench;
 mod camera;
 mod demo;
 mod info;
 mod input;
 mod integral;
+mod legend;
+mod look;
 mod output;
 mod parse;
 mod progress;
@@ -15,7 +18,7 @@ mod tables;
 mod variant;
 
 use anyhow::Result;
-use clap::{Parser, Subcommand};
+use clap::{ArgAction, CommandFactory, FromArgMatches, Parser, Subcommand};
 use halite::gpu::DeviceChoice;
 use halite::render::Renderer;
 use std::process::ExitCode;
@@ -27,7 +30,7 @@ struct Cli {
     #[command(subcommand)]
     command: Command,
     /// Threads to work with; 0 is one for each core
-    #[arg(long, global = true, value_name = "N", default_value_t = 0)]
+    #[arg(long, global = true, value_name = "N", default_value_t = 0, value_parser = parse::count)]
     threads: usize,
     /// Say on stderr what is chosen and left out
     #[arg(short, long, global = true)]
@@ -44,9 +47,15 @@ enum Command {
     Demo(demo::Options),
 }
 
+#[global_allocator]
+static MEMORY: allocator::Ending = allocator::Ending;
+
 fn main() -> ExitCode {
     hush_mesa();
-    let cli = Cli::parse();
+    let cli = match Cli::from_arg_matches(&numbers_are_values(Cli::command()).get_matches()) {
+        Ok(cli) => cli,
+        Err(misuse) => misuse.exit(),
+    };
     let level = if cli.verbose { tracing::Level::INFO } else { tracing::Level::WARN };
     tracing_subscriber::fmt()
         .with_max_level(level)
@@ -65,6 +74,16 @@ fn main() -> ExitCode {
             }
         },
     }
+}
+
+/// Has every option that takes a value take `-1` as one, to say what is wrong with it, and not as an option.
+fn numbers_are_values(command: clap::Command) -> clap::Command {
+    let takes = |action: &ArgAction| matches!(action, ArgAction::Set | ArgAction::Append);
+    let command = command.mut_args(|arg| {
+        let numbers = takes(arg.get_action()) && !arg.is_positional();
+        if numbers { arg.allow_negative_numbers(true) } else { arg }
+    });
+    command.mut_subcommands(numbers_are_values)
 }
 
 /// Mesa's selection of devices asks Wayland, which complains on stderr where there is no session.

@@ -21,6 +21,22 @@ pub(crate) fn vector(text: &str) -> Result<DVec3, String> {
     numbers(text).map(DVec3::from)
 }
 
+/// `X,Y,Z`, all above 0
+pub(crate) fn factors(text: &str) -> Result<DVec3, String> {
+    let factors = vector(text)?;
+    if factors.cmpgt(DVec3::ZERO).all() { Ok(factors) } else { Err("all three factors are above 0".into()) }
+}
+
+/// A whole number from 0.
+pub(crate) fn count(text: &str) -> Result<usize, String> {
+    text.trim().parse().map_err(|_| "it is a whole number from 0".into())
+}
+
+/// A text that is not empty.
+pub(crate) fn name(text: &str) -> Result<String, String> {
+    if text.trim().is_empty() { Err("the name is empty".into()) } else { Ok(text.into()) }
+}
+
 /// A number above 0.
 pub(crate) fn positive(text: &str) -> Result<f64, String> {
     number(text).and_then(|n| if n > 0.0 { Ok(n) } else { Err("it is above 0".into()) })
@@ -91,6 +107,20 @@ pub(crate) fn background(text: &str) -> Result<Background, String> {
     })
 }
 
+/// `R,G,B` or `R,G,B,A`: a colour in 0 to 1, and an opacity
+pub(crate) fn color_and_opacity(text: &str) -> Result<([f64; 3], Option<f64>), String> {
+    let list = text.split(',').map(number).collect::<Result<Vec<_>, _>>()?;
+    let (color, opacity) = match list[..] {
+        [r, g, b] => ([r, g, b], None),
+        [r, g, b, a] => ([r, g, b], Some(a)),
+        _ => return Err(format!("{} numbers, not red, green, blue and perhaps an opacity", list.len())),
+    };
+    if !color.iter().all(|c| (0.0..=1.0).contains(c)) {
+        return Err("red, green and blue are 0 to 1".into());
+    }
+    if opacity.is_some_and(|a| a < 0.0) { Err("the opacity is 0 or more".into()) } else { Ok((color, opacity)) }
+}
+
 /// `X,Y,Z,NX,NY,NZ`
 pub(crate) fn plane(text: &str) -> Result<ClippingPlane, String> {
     let [x, y, z, a, b, c] = numbers(text)?;
@@ -132,6 +162,11 @@ mod tests {
             assert!(size(wrong).is_err(), "{wrong}");
         }
         assert!(gain("nan").is_err() && gain("-1").is_err() && gain("1e60").is_err() && gain("0.5") == Ok(0.5));
+        assert_eq!(factors("1,1,50"), Ok(DVec3::new(1.0, 1.0, 50.0)));
+        assert!(factors("1,0,1").is_err() && factors("2").is_err() && count("-1").is_err() && name(" ").is_err());
+        assert_eq!(color_and_opacity("1,0,0.5"), Ok(([1.0, 0.0, 0.5], None)));
+        assert_eq!(color_and_opacity("1,0,0,2"), Ok(([1.0, 0.0, 0.0], Some(2.0))));
+        assert!(["1,0", "2,0,0", "1,0,0,-1"].iter().all(|wrong| color_and_opacity(wrong).is_err()));
         assert!(range("2:1").is_err() && range("nan:1").is_err() && vector("1,2").is_err());
         assert!(background("0,0,255").is_err() && plane("0,0,0,0,0,0").is_err() && positive("0").is_err());
     }

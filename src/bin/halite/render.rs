@@ -1,7 +1,9 @@
-use crate::{camera, input, integral, output, parse, progress, variant};
+use crate::legend::Legend;
+use crate::{camera, input, integral, look, output, parse, progress, variant};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
-use halite::field::{Association, Component, Field};
+use glam::DVec3;
+use halite::field::{Association, Component, Field, Kind};
 use halite::gpu::DeviceChoice;
 use halite::image::{Backdrop, Image};
 use halite::integral::choice::{Choice, Form};
@@ -9,9 +11,8 @@ use halite::io::Time;
 use halite::mesh::{Mesh, cells::Tetrahedra};
 use halite::project::Switches;
 use halite::render::{self, Renderer, Stats};
-use halite::scene::{Scalars, Scene, automatic};
+use halite::scene::{Scalars, Scene, automatic, missing};
 use halite::transfer::TransferFunction;
-use halite::transfer::colormap::ColorMap;
 use halite::view::{Blend, Camera, ClippingPlane};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -36,6 +37,9 @@ pub(crate) struct Options {
     /// Write what was done, and the time and memory it took, as JSON
     #[arg(long, value_name = "FILE")]
     stats: Option<PathBuf>,
+    /// Draw a colour bar with numbers, title and opacities into the picture (.png)
+    #[arg(long, help_heading = "Look")]
+    legend: bool,
 }
 
 /// What to draw, and how.
@@ -50,13 +54,24 @@ pub(crate) struct Request {
     /// Width and height in pixels [default: the scene's, or 1024x768]
     #[arg(long, value_name = "WxH", value_parser = parse::size)]
     size: Option<[u32; 2]>,
+    /// Stretch the mesh, such as 1,1,50 to exaggerate heights; lengths are as they are seen then
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse::factors, allow_hyphen_values = true)]
+    scale: Option<DVec3>,
     /// What a .png shows behind the volume: R,G,B in 0 to 1, "black", "white", or "none" for transparency
     #[arg(long, value_name = "COLOR", value_parser = parse::background)]
     background: Option<parse::Background>,
 
     /// The array to draw [default: the first useful one]
-    #[arg(long, value_name = "NAME", help_heading = "Field")]
+    #[arg(long, value_name = "NAME", value_parser = parse::name, help_heading = "Field")]
     scalars: Option<String>,
+    /// The array whose first three values are the colour, and whose fourth drives the opacity
+    #[arg(long, value_name = "NAME", value_parser = parse::name, help_heading = "Field",
+        conflicts_with_all = ["scalars", "component", "colormap", "range", "log", "nan_color"])]
+    rgba: Option<String>,
+    /// The array whose first value drives the colour, and whose second drives the opacity
+    #[arg(long, value_name = "NAME", value_parser = parse::name, help_heading = "Field",
+        conflicts_with_all = ["scalars", "component", "rgba", "nan_color"])]
+    pair: Option<String>,
     /// Whether it belongs to points or cells [default: points first]
     #[arg(long, help_heading = "Field")]
     association: Option<Of>,
@@ -64,18 +79,25 @@ pub(crate) struct Request {
     #[arg(long, value_name = "N", value_parser = parse::component, help_heading = "Field")]
     component: Option<Component>,
 
-    /// viridis, inferno, "cool to warm", grey, or a preset of ParaView: FILE.json, or FILE.json:NAME
+    /// viridis, plasma, inferno, magma, cividis, turbo, twilight, jet, "cool to warm" or grey, each with _r reversed; or a
+    /// preset of ParaView: FILE.json, or FILE.json:NAME
     #[arg(long, value_name = "MAP", help_heading = "Look")]
-    colormap: Option<String>,
+    pub(crate) colormap: Option<String>,
     /// The scalars that colours and opacities range over
     #[arg(long, value_name = "LO:HI", value_parser = parse::range, allow_hyphen_values = true, help_heading = "Look")]
-    range: Option<[f64; 2]>,
+    pub(crate) range: Option<[f64; 2]>,
+    /// Colours and opacities are even over the logarithm of the scalars
+    #[arg(long, help_heading = "Look")]
+    pub(crate) log: bool,
     /// Opacity at scalars, linear between them; a scalar may be a percentage of the range: 0%:0,40%:0.3,100%:1
     #[arg(long, value_name = "S:A,...", value_parser = parse::opacity, allow_hyphen_values = true, help_heading = "Look")]
-    opacity: Option<automatic::Opacity>,
+    pub(crate) opacity: Option<automatic::Opacity>,
+    /// Draw where values are missing (NaN, infinite) in a colour; an opacity may follow [default: nothing is drawn there]
+    #[arg(long, value_name = "R,G,B[,A]", value_parser = parse::color_and_opacity, help_heading = "Look")]
+    nan_color: Option<([f64; 3], Option<f64>)>,
     /// The length that opacities are meant for, in world units
     #[arg(long, value_name = "LENGTH", value_parser = parse::positive, help_heading = "Look")]
-    unit_distance: Option<f64>,
+    pub(crate) unit_distance: Option<f64>,
     /// Integrate along each ray, or show its largest value
     #[arg(long, help_heading = "Look")]
     blend: Option<Blending>,
@@ -129,12 +151,18 @@ impl From<Engine> for render::Engine {
 
 pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     output::check_stream(&options.out, options.format.as_deref())?;
+    let format = if input::is_standard(&options.out) { options.format.as_deref() } else { None };
+    let ending = options.out.extension().and_then(|e| e.to_str());
+    if options.legend && !format.or(ending).unwrap_or("png").eq_ignore_ascii_case("png") {
+        return Err(output::misuse("--legend: a legend is drawn into a .png picture, others hold the integral alone"));
+    }
     if let Some(path) = &options.stats {
         output::check(path)?;
     }
     let request = &options.request;
     let given = request.scene()?;
     let mut renderer = request.renderer(threads, given.as_ref(), request.device(given.as_ref()))?;
+    request.check_room(given.as_ref())?;
     let report = if options.all_times {
         all_times(options, given, &mut renderer)?
     } else {
@@ -150,7 +178,11 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
 /// Draws a picture into a file, and says what it took.
 fn picture(options: &Options, out: &Path, job: Job, renderer: &mut Renderer) -> Result<serde_json::Value> {
     let background = job.scene.background;
-    let drawn = draw(job, renderer)?;
+    let legend = if options.legend { Some(job.legend()?) } else { None };
+    let mut drawn = draw(job, renderer)?;
+    if let Some(legend) = legend {
+        legend.draw(&mut drawn.image, background.unwrap_or_default().map(|c| c as f32));
+    }
     let format = options.format.as_deref().unwrap_or("png");
     output::picture(&drawn.image, out, format, backdrop(background, drawn.behind.as_deref()))?;
     Ok(drawn.report())
@@ -209,6 +241,8 @@ pub(crate) struct Job {
     pub(crate) tetrahedra: Tetrahedra,
     pub(crate) field: Field,
     pub(crate) scene: Scene,
+    /// What a legend tells, where values have colours of a map.
+    pub(crate) legend: Option<Legend>,
     pub(crate) load_ms: f64,
     pub(crate) split_ms: f64,
 }
@@ -218,41 +252,63 @@ pub(crate) fn prepare(options: &Request, given: Option<Scene>) -> Result<Job> {
 }
 
 fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut Steps) -> Result<Job> {
-    let map = options.colormap.as_deref().map(color_map).transpose()?;
+    let mut map = options.colormap.as_deref().map(look::color_map).transpose()?;
     let from_file = given.is_some();
     let start = Instant::now();
     let path = given.as_ref().map_or(options.input.clone(), |scene| scene.mesh.clone());
-    let mesh = input::mesh(&path, steps.time)?;
+    let mut mesh = input::mesh(&path, steps.time)?;
+    if let Some(by) = options.scale {
+        mesh = mesh.scaled(by).with_context(|| path.display().to_string())?;
+    }
     let load_ms = ms(start);
     let start = Instant::now();
-    let tetrahedra = Tetrahedra::new(&mesh).with_context(|| path.display().to_string())?;
+    let split = progress::busy("splitting", || Tetrahedra::new(&mesh));
+    let mut tetrahedra = split.with_context(|| path.display().to_string())?;
     let split_ms = ms(start);
-    tetrahedra.skipped.log();
+    tetrahedra.log();
 
-    let scalars = match &steps.scalars {
-        Some(scalars) => scalars.clone(),
-        None => options.scalars(given.as_ref(), &mesh)?,
+    let solid = given.is_none() && options.has_no_choice(&mesh);
+    let (scalars, mut field) = if solid {
+        tracing::info!("{}: it has no array of points or cells, and is drawn in one colour", path.display());
+        let (field, color) = automatic::solid(&mesh)?;
+        map.get_or_insert(color);
+        (Scalars { name: String::new(), association: None, component: None }, field)
+    } else {
+        let scalars = match &steps.scalars {
+            Some(scalars) => scalars.clone(),
+            None => options.scalars(given.as_ref(), &mesh)?,
+        };
+        steps.scalars = Some(scalars.clone());
+        let field = scalars.field(&mesh).with_context(|| path.display().to_string())?;
+        options.check(&field)?;
+        (scalars, field)
     };
-    steps.scalars = Some(scalars.clone());
-    let field = scalars.field(&mesh).with_context(|| path.display().to_string())?;
     let mut scene = match given {
-        Some(scene) => options.restyled(scene, map)?,
+        Some(scene) => look::restyled(options, scene, map)?,
         None => {
+            let size = options.size.unwrap_or(automatic::SIZE);
+            let first = automatic::camera(&mesh, &tetrahedra, size);
+            let framed = |camera| automatic::framed(&mesh, &tetrahedra, camera, size);
             let wishes = automatic::Wishes {
                 range: options.range.or(steps.range),
                 map,
                 opacity: options.opacity.clone(),
                 unit_distance: options.unit_distance,
+                logarithmic: options.log,
                 blend: options.blend().unwrap_or_default(),
+                size: Some(size),
+                camera: Some(options.camera.framed(first, framed)),
             };
-            let mut scene = automatic::scene(&mesh, &tetrahedra, scalars, &field, wishes)?;
+            let mut scene = automatic::scene(&mesh, &tetrahedra, scalars.clone(), &field, wishes)?;
             let look = steps.look.get_or_insert_with(|| (scene.transfer.clone(), scene.camera));
             (scene.transfer, scene.camera) = look.clone();
             scene
         }
     };
     scene.size = options.size.unwrap_or(scene.size);
-    scene.camera = options.camera.apply(scene.camera);
+    if from_file {
+        scene.camera = options.camera.apply(scene.camera);
+    }
     scene.blend = options.blend().unwrap_or(scene.blend);
     scene.clipping_planes.extend(&options.clip);
     scene.background = match options.background {
@@ -261,7 +317,28 @@ fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut Steps) -> R
         None if from_file => Some(scene.background.unwrap_or_default()),
         None => scene.background,
     };
-    Ok(Job { mesh, tetrahedra, field, scene, load_ms, split_ms })
+    let legend = if solid { None } else { Legend::new(&scalars, &field, &scene.transfer, options.log) };
+    if let (Some((color, opacity)), false) = (options.nan_color, solid) {
+        let (transfer, blend) = (&scene.transfer, scene.blend);
+        let shown = missing::shown(&mesh, &tetrahedra, &scalars, transfer, blend, color, opacity)?;
+        if let Some(shown) = shown {
+            (field, scene.transfer) = (shown.field, shown.transfer);
+            if let Some((own, split)) = shown.mesh {
+                (mesh, tetrahedra) = (own, split);
+            }
+        }
+    }
+    Ok(Job { mesh, tetrahedra, field, scene, legend, load_ms, split_ms })
+}
+
+impl Job {
+    /// What a legend tells.
+    ///
+    /// # Errors
+    /// Where the colours are the array's own, or one.
+    fn legend(&self) -> Result<Legend> {
+        self.legend.clone().context("--legend: the colours here are not those of a colour map over a range of values")
+    }
 }
 
 impl Request {
@@ -270,6 +347,14 @@ impl Request {
         let Some(scene) = input::scene(&self.input)? else { return Ok(None) };
         check_engine(&scene).with_context(|| self.input.display().to_string())?;
         Ok(Some(scene))
+    }
+
+    /// Refuses a picture that there is no memory for, before a mesh is read.
+    fn check_room(&self, scene: Option<&Scene>) -> Result<()> {
+        let [w, h] = self.size.or(scene.map(|s| s.size)).unwrap_or(automatic::SIZE);
+        // Beyond this, the view says what is wrong.
+        let pixels = u64::from(w) * u64::from(h);
+        Ok(halite::memory::check(&format!("a picture of {w}x{h} pixels"), pixels.min(1 << 28) * 16)?)
     }
 
     /// The device that was asked for.
@@ -337,13 +422,34 @@ impl Request {
         Ok(choice.table)
     }
 
+    /// Whether no array is asked for, and there is none to choose.
+    fn has_no_choice(&self, mesh: &Mesh) -> bool {
+        let asked = self.scalars.is_some() || self.rgba.is_some() || self.pair.is_some();
+        let wanted = asked || self.association.is_some() || self.component.is_some();
+        !wanted && mesh.point_arrays().is_empty() && mesh.cell_arrays().is_empty()
+    }
+
+    /// Refuses an array that is not what it was asked for as.
+    fn check(&self, field: &Field) -> Result<()> {
+        for (name, kind, many) in [(&self.rgba, Kind::Rgba, "four"), (&self.pair, Kind::Pair, "two")] {
+            if let (Some(name), true) = (name, field.kind() != kind) {
+                let n = field.kind().components();
+                bail!("{}: array \"{name}\" has {n} components, and not {many}", self.input.display());
+            }
+        }
+        Ok(())
+    }
+
     fn scalars(&self, scene: Option<&Scene>, mesh: &Mesh) -> Result<Scalars> {
         let association = self.association.map(|a| match a {
             Of::Point => Association::Point,
             Of::Cell => Association::Cell,
         });
-        let mut scalars = match (&self.scalars, scene) {
-            (Some(name), _) => Scalars { name: name.clone(), association: None, component: None },
+        let named = self.rgba.as_ref().or(self.pair.as_ref());
+        let mut scalars = match (self.scalars.as_ref().or(named), scene) {
+            (Some(name), _) => {
+                Scalars { name: name.clone(), association: None, component: named.map(|_| Component::All) }
+            }
             (None, Some(scene)) => scene.scalars.clone(),
             (None, None) => automatic::scalars(mesh, association).with_context(|| self.input.display().to_string())?,
         };
@@ -358,41 +464,6 @@ impl Request {
             Blending::Maximum => Blend::Maximum,
         })
     }
-
-    /// `scene`, with the transfer function that the options ask for.
-    fn restyled(&self, mut scene: Scene, map: Option<ColorMap>) -> Result<Scene> {
-        let old = &scene.transfer;
-        let (first, last) = (old.color()[0].0, old.color()[old.color().len() - 1].0);
-        let range = self.range.unwrap_or([first, last]);
-        // A range moves both functions; opacity knots may lie outside that of the colours.
-        let moved = |s: f64| match self.range {
-            Some([lo, hi]) if last > first => lo + (hi - lo) * ((s - first) / (last - first)),
-            _ => s,
-        };
-        let opacity = match (&self.opacity, map.as_ref().and_then(|m| m.opacity_over(range))) {
-            (Some(o), _) => o.over(range),
-            (None, Some(o)) => o,
-            (None, None) => old.opacity().iter().map(|&(s, a)| (moved(s), a)).collect(),
-        };
-        let color = match map {
-            Some(map) => map.over(range),
-            None => old.color().iter().map(|&(s, c)| (moved(s), c)).collect(),
-        };
-        scene.transfer = TransferFunction::new(color, opacity, self.unit_distance.unwrap_or(old.unit_distance()))?
-            .with_convention(old.convention())
-            .with_clamp(old.clamp())
-            .with_emission(old.emission())?;
-        Ok(scene)
-    }
-}
-
-/// A colour map by name, or from `FILE.json` or `FILE.json:NAME`.
-fn color_map(text: &str) -> Result<ColorMap> {
-    let (file, preset) = match text.split_once(".json:") {
-        Some((stem, preset)) => (format!("{stem}.json"), Some(preset)),
-        None => (text.to_owned(), None),
-    };
-    Ok(if file.ends_with(".json") { ColorMap::open(Path::new(&file), preset)? } else { ColorMap::named(text)? })
 }
 
 /// Refuses what a scene asks for and Halite has not: what options ask for, clap has checked.
@@ -430,9 +501,10 @@ pub(crate) struct Times {
 }
 
 pub(crate) fn draw(job: Job, renderer: &mut Renderer) -> Result<Drawn> {
-    let Job { mesh, tetrahedra, field, scene, load_ms, split_ms } = job;
+    let Job { mesh, tetrahedra, field, scene, load_ms, split_ms, .. } = job;
     let (view, behind) = scene.view()?;
-    renderer.set_mesh(&mesh, tetrahedra);
+    renderer.check_room(mesh.points().len(), &tetrahedra)?;
+    progress::busy("matching faces", || renderer.set_mesh(&mesh, tetrahedra));
     renderer.set_field(&field)?;
     renderer.set_transfer(&scene.transfer);
     // The renderer has its own copy, and the meshes that people draw are large.
@@ -459,7 +531,7 @@ pub(crate) fn report(s: &Stats, times: &Times, size: [u32; 2], frame_ms: f64) ->
         "integral": s.integral, "table_ms": s.table_ms, "table_bytes": s.table_bytes, "knots_per_cell": s.knots_per_cell,
         "steps": s.steps, "repaired_rays": s.repaired_rays, "cpu_rays": s.cpu_rays,
         "device_ms": s.device_ms, "uploaded_bytes": s.uploaded_bytes, "device_bytes": s.device_bytes,
-        "peak_bytes": peak_bytes(), "projection": s.projection,
+        "peak_bytes": peak_bytes(), "projection": s.projection, "sweep": s.sweep,
     })
 }
 

@@ -1,10 +1,10 @@
 //! The switches of the projection engine, as options and in scenes.
 
-use anyhow::{Context, Result};
+use anyhow::{Result, anyhow};
 use clap::Args;
 use halite::project::{Compositing, Fragments, Order, Switches, Target, Thickness};
-use halite::scene::Scene;
-use serde::de::{DeserializeOwned, IntoDeserializer};
+use halite::scene::{Scene, read};
+use serde::de::DeserializeOwned;
 use std::path::Path;
 
 /// What of the projection engine's variant somebody said.
@@ -16,7 +16,7 @@ pub(crate) struct Variant {
     /// How long a ray's way through an interpolated cell is: distance, or depth
     #[arg(long, value_name = "KIND", value_parser = named::<Thickness>, help_heading = "Projection engine")]
     thickness: Option<Thickness>,
-    /// In which sequence cells are drawn: depth, circumsphere (exact for Delaunay meshes), or none
+    /// In which sequence cells are drawn: depth, circumsphere (for Delaunay meshes, as exact as f64), or none
     #[arg(long, value_name = "KIND", value_parser = named::<Order>, help_heading = "Projection engine")]
     order: Option<Order>,
     /// What cells are blended into: rgba32float, rgba16float or rgba8
@@ -61,13 +61,12 @@ impl Variant {
 /// The switches of a scene's "projection".
 pub(crate) fn of_scene(scene: &Scene, path: &Path) -> Result<Switches> {
     let Some(value) = &scene.projection else { return Ok(Switches::default()) };
-    serde_path_to_error::deserialize(value).with_context(|| format!("{}: projection", path.display()))
+    read(value).map_err(|what| anyhow!("{}: projection: {what}", path.display()))
 }
 
 /// A variant by the name that scenes know it by.
 pub(crate) fn named<T: DeserializeOwned>(text: &str) -> Result<T, String> {
-    let text: serde::de::value::StrDeserializer<serde::de::value::Error> = text.into_deserializer();
-    T::deserialize(text).map_err(|e| e.to_string())
+    read(&text.into())
 }
 
 /// `NxN` or `NxNxN`; the third is 0 in the first, which only polynomials are.

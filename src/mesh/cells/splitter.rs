@@ -2,8 +2,8 @@
 
 use super::curved::{self, Node, Recipe};
 use super::linear::{PRISM_5, PRISM_6, Shape, order, shape, split};
-use super::polyhedron::Cut;
-use super::{Added, Skipped, dimension, mean, name};
+use super::polyhedron::{Corner, Cut, Solved, Split};
+use super::{Added, Listed, Skipped, dimension, mean, name};
 use crate::error::{Error, Result};
 use crate::mesh::{Array, Mesh, POLYHEDRON, Polyhedra};
 use glam::DVec3;
@@ -62,6 +62,8 @@ pub(super) struct Count {
     pub(super) tetrahedra: usize,
     pub(super) added: usize,
     pub(super) skipped: Skipped,
+    /// The polyhedra that are not simple, ascending, and their splits, without tetrahedra for those that are left out.
+    pub(super) solved: Vec<(usize, Solved)>,
 }
 
 impl<'a> Splitter<'a> {
@@ -166,9 +168,27 @@ impl<'a> Splitter<'a> {
                 }
                 Fate::Polyhedron(faces) => {
                     self.cut(c, faces, cut);
-                    count.tetrahedra += cut.tetrahedra();
-                    count.added += usize::from(cut.needs_middle());
-                    skipped.empty += usize::from(cut.tetrahedra() == 0);
+                    let solved = match cut.split(self.mesh.points()) {
+                        Split::Simple => {
+                            count.tetrahedra += cut.tetrahedra();
+                            count.added += usize::from(cut.needs_middle());
+                            continue;
+                        }
+                        Split::Solved(solved) => {
+                            count.tetrahedra += solved.tetrahedra.len();
+                            count.added += solved.added.len();
+                            solved
+                        }
+                        left_out => {
+                            match left_out {
+                                Split::Open => skipped.open.add(c),
+                                Split::Flat => skipped.flat.add(c),
+                                _ => skipped.empty += 1,
+                            }
+                            Solved::default()
+                        }
+                    };
+                    count.solved.push((c, solved));
                 }
                 Fate::LowerDimensional => skipped.lower_dimensional += 1,
                 Fate::Unsupported => *skipped.unsupported.entry(self.mesh.cells().types[c]).or_default() += 1,
@@ -180,16 +200,18 @@ impl<'a> Splitter<'a> {
     }
 
     /// Writes the tetrahedra of the cells `range` to `corners`, and to `cell` (empty if not wanted) where they are
-    /// from. Returns the points that they add, numbered from `first` on, and how many polyhedra are crooked.
+    /// from; `solved` is what counting them found. Returns the points that they add, numbered from `first` on, and the
+    /// polyhedra that are crooked.
     pub(super) fn fill(
         &self,
         range: Range<usize>,
+        mut solved: &[(usize, Solved)],
         first: u32,
         corners: &mut [[u32; 4]],
         cell: &mut [u32],
-    ) -> (Added, usize) {
+    ) -> (Added, Listed) {
         let points = self.mesh.points();
-        let (mut at, mut added, mut crooked) = (0, Added::default(), 0);
+        let (mut at, mut added, mut crooked) = (0, Added::default(), Listed::default());
         let (mut cut, mut local) = (Cut::default(), Local::default());
         for c in range {
             let next = first + added.len() as u32;
@@ -212,16 +234,30 @@ impl<'a> Splitter<'a> {
                     }
                     end
                 }
+                Ok(Fate::Polyhedron(_)) if solved.first().is_some_and(|s| s.0 == c) => {
+                    let split = &solved[0].1;
+                    solved = &solved[1..];
+                    let end = at + split.tetrahedra.len();
+                    let corner = |corner: Corner| match corner {
+                        Corner::Own(p) => p,
+                        Corner::Added(i) => next + i,
+                    };
+                    for (out, t) in corners[at..end].iter_mut().zip(&split.tetrahedra) {
+                        *out = t.map(corner);
+                    }
+                    split.added.iter().for_each(|weights| added.push(weights.iter().copied()));
+                    if split.crooked {
+                        crooked.add(c);
+                    }
+                    end
+                }
                 Ok(Fate::Polyhedron(faces)) => {
                     self.cut(c, faces, &mut cut);
                     let end = at + cut.tetrahedra();
-                    cut.fill(next, &mut corners[at..end]);
+                    cut.fill(points, next, &mut corners[at..end]);
                     if cut.needs_middle() {
-                        let middle = cut.middle(points);
                         let equal = 1.0 / cut.points.len() as f64;
-                        let weight = |i: usize| middle.weights.as_ref().map_or(equal, |w| w[i]);
-                        added.push(cut.points.iter().enumerate().map(|(i, p)| (*p, weight(i))));
-                        crooked += usize::from(!middle.sees_all);
+                        added.push(cut.points.iter().map(|p| (*p, equal)));
                     }
                     end
                 }

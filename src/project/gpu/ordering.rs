@@ -66,8 +66,8 @@ impl Project {
             chunk,
             chunks,
         };
-        // Cells in parts are sorted on the host, which can make several entries of one.
-        if self.sorts && parts == Parts::None && by != Order::None && Sorter::fits(&self.gpu, cells) {
+        // Cells in parts are sorted on the host, which can make several entries of one, and spheres in f64.
+        if self.sorts && parts == Parts::None && by == Order::Depth && Sorter::fits(&self.gpu, cells) {
             if self.sorter.is_none() {
                 self.sorter = Some(Sorter::new(&self.gpu, HIDDEN)?);
             }

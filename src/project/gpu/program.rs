@@ -13,7 +13,7 @@ use crate::order::depth::HIDDEN;
 use crate::project::frame::{GROWTH, Limits};
 use crate::project::lines::{BINS, LINES_ACROSS};
 use crate::project::record::Layout;
-use crate::project::{Compositing, Fragments, Order, Switches, Thickness};
+use crate::project::{Compositing, Fragments, Switches, Thickness};
 use wgpu::ShaderStages as Stages;
 
 const SHARED: &str = include_str!("../../../shaders/project.wgsl");
@@ -138,7 +138,6 @@ pub(super) fn program(
         ("HAS_PLANES", limits.planes),
         ("IS_CLIPPED", limits.range),
         ("PERSPECTIVE", limits.perspective),
-        ("BY_SPHERE", switches.order == Order::Circumsphere),
     ] {
         text += &format!("const {name} = {value};\n");
     }

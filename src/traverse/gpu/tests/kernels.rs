@@ -280,9 +280,18 @@ fn segments_are_integrated_as_in_f64() {
                     1 => 1e-4 * random.within(-1.0, 1.0) as f32,
                     _ => random.within(-1.0, 1.0) as f32,
                 };
-                let (front, mut back) = ([(); 4].map(|()| value()), [(); 4].map(|()| value()));
+                let (mut front, mut back) = ([(); 4].map(|()| value()), [(); 4].map(|()| value()));
                 if i % 7 == 0 {
                     back = front;
+                }
+                if i % 11 == 0 {
+                    // An outlier, at one end or both.
+                    let k = kind.components() - 1;
+                    let outlier = 10f64.powf(random.within(0.0, 12.0)) as f32 * [1.0, -1.0][random.below(2)];
+                    back[k] = outlier;
+                    if i % 33 == 0 {
+                        front[k] = -outlier * random.unit() as f32;
+                    }
                 }
                 let rgb = |v: [f32; 4]| if kind == Kind::Rgba { [v[0].abs(), v[1].abs(), v[2].abs(), v[3]] } else { v };
                 let length =

@@ -2,6 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot set up its files has failed")]
 
+mod look;
+mod refusals;
+
 use assert_cmd::Command;
 use halite::image::Image;
 use std::fmt::Write;
@@ -138,8 +141,6 @@ fn failures_are_one_line() {
     place.write("lost.json", &SCENE.replace("cube.vtu", "sub/lost.vtu"));
     place.fails("render none.vtu --out x.png", &["none.vtu"]);
     place.fails("info none.vtu", &["none.vtu"]);
-    place.write("bare.vtu", &ODD.replace("CellData", "Nothing").replace("nan", "7"));
-    place.fails("render bare.vtu --out x.png", &["bare.vtu", "no array of points or cells"]);
     place.fails("render . --out x.png", &["halite: .: "]);
     for (name, text, part) in [
         ("a.vti", "<VTKFile type='ImageData'/>", "a structured grid"),
@@ -176,7 +177,7 @@ fn failures_are_one_line() {
     place.fails("render scene.json --out x.gif", &["x.gif", ".png"]);
     place.fails("render scene.json --out no/x.png", &["no/x.png", "folder"]);
     place.fails("render scene.json --out x.png --stats no/x.json", &["no/x.json", "folder"]);
-    place.fails("render cube.vtu --out x.png --colormap jet", &["jet", "viridis"]);
+    place.fails("render cube.vtu --out x.png --colormap bone", &["bone", "viridis", "jet", "_r"]);
     place.fails("render cube.vtu --out x.png --colormap none.json", &["none.json"]);
     place.fails("render cube.vtu --out x.png --opacity 1:0,0:1", &["ascend"]);
     place.fails("render cube.vtu --out x.png --position 1,1,1 --focal-point 1,1,1", &["the same"]);

@@ -1,0 +1,336 @@
+//! The projection on the CPU: cells are dealt to tiles of the image, ordered tile by tile, and swept from front to back with
+//! neighbouring pixels in vector lanes. Nothing is gathered: a cell's numbers are the same for all of its pixels.
+//!
+//! The stages: [`coarse`] projects points and deals cells to tiles, [`setup`] makes records of a tile's cells, [`order`] finds their
+//! sequence, [`fine`] draws them. Each pixel checks that what it composites is the mesh along its ray, piece after piece; those where
+//! it is not are drawn again by the walk. So the picture is the walk's where the order fails.
+
+mod coarse;
+mod fine;
+mod flat;
+mod lanes;
+mod order;
+mod setup;
+#[cfg(test)]
+pub(crate) mod tests;
+
+use crate::geometry::{Geometry, Values};
+use crate::integral::Integral;
+use crate::traverse::cpu;
+use crate::view::View;
+use coarse::{Dealt, Lens, TILE};
+use fearless_simd::{Level, Simd};
+use fine::{Canvas, Flaw};
+use order::{Crossings, Order};
+use rayon::prelude::*;
+use setup::{Record, Scene};
+use std::ops::ControlFlow;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
+
+/// The most columns or rows of an image: beyond, single floats do not tell places.
+const MOST_PIXELS: u32 = 1 << 15;
+
+/// Of the pixels that the mesh covers, the share from which on the walk draws all of a frame again.
+const MOST_REDRAWN: f64 = 0.25;
+
+/// What is kept between frames.
+#[derive(Debug)]
+pub(crate) struct Sweep {
+    level: Level,
+    places: Vec<[f32; 2]>,
+    /// Memory of threads: zeros, one for each cell.
+    spare: Mutex<Vec<Vec<u32>>>,
+    /// Tests have this done to the order of cells.
+    #[cfg(test)]
+    pub(crate) fault: Option<tests::Fault>,
+}
+
+/// What a frame took.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Counts {
+    /// Cells dealt to tiles.
+    pub(crate) cells: u64,
+    /// Segments of rays in cells.
+    pub(crate) fragments: u64,
+    /// Pixels drawn again: as cells overlapped, as a part of the mesh was missing, as the boundary was not closed, as f32
+    /// was too coarse.
+    pub(crate) redrawn: [u64; 4],
+    /// What the walk did.
+    pub(crate) walked: cpu::Counts,
+    /// Why the walk drew all of the frame, if it did.
+    pub(crate) handed_over: Option<&'static str>,
+}
+
+/// What a frame is drawn from.
+pub(crate) struct Frame<'a, const N: usize> {
+    pub(crate) geometry: &'a Geometry,
+    pub(crate) values: &'a Values<N>,
+    pub(crate) integral: Integral<'a>,
+    pub(crate) view: &'a View,
+    /// Turns the largest values along a ray into a premultiplied colour.
+    pub(crate) color: &'a (dyn Fn(&[f32; N]) -> [f32; 4] + Sync),
+    pub(crate) progress: &'a (dyn Fn(f64) -> ControlFlow<()> + Sync),
+}
+
+/// What a thread draws tiles with.
+struct Worker<const N: usize> {
+    records: Vec<Record<N>>,
+    cells: Vec<u32>,
+    crossings: Crossings,
+    order: Order,
+    canvas: Canvas<N>,
+}
+
+/// The rows of one tile of the image.
+struct Target<'a> {
+    index: usize,
+    rows: Vec<&'a mut [[f32; 4]]>,
+}
+
+/// What was drawn of one tile.
+#[derive(Default)]
+struct Done {
+    cells: u64,
+    fragments: u64,
+    covered: u64,
+    flawed: Vec<(usize, Flaw)>,
+}
+
+impl Sweep {
+    pub(crate) fn new() -> Self {
+        Sweep {
+            level: Level::new(),
+            places: vec![],
+            spare: Mutex::default(),
+            #[cfg(test)]
+            fault: None,
+        }
+    }
+
+    /// Draws a frame on the current rayon pool.
+    pub(crate) fn render<const N: usize>(&mut self, frame: &Frame<N>) -> (Vec<[f32; 4]>, Counts) {
+        let size = frame.view.size();
+        if size.iter().any(|&n| n > MOST_PIXELS) {
+            return walk(frame, Counts { handed_over: Some("the image is too wide or high"), ..Counts::default() });
+        }
+        let mut pixels = vec![[0.0; 4]; size[0] as usize * size[1] as usize];
+        let Some(lens) = Lens::new(frame.geometry, frame.view) else { return (pixels, Counts::default()) };
+        let Frame { geometry, values, .. } = *frame;
+        coarse::project(&lens, &geometry.points, &mut self.places);
+        let places = &self.places;
+        let bounds = |i: usize| coarse::bounds(&lens, &geometry.points, places, geometry.cells[i].corners);
+        let cells = Dealt::new(&lens, geometry.cells.len(), bounds);
+        let bounds = |i: usize| coarse::bounds(&lens, &geometry.points, places, geometry.boundary.faces[i].points);
+        let faces = Dealt::new(&lens, geometry.boundary.faces.len(), bounds);
+        let (exact, blend) = (frame.integral.exact, frame.view.blend());
+        let steepest = exact.opacity.steepest();
+        let scene = Scene { geometry, values, exact, steepest, blend, lens: &lens, places };
+
+        let mut targets = targets(&mut pixels, &lens);
+        let (done, tiles, stopped) = (AtomicUsize::new(0), targets.len(), AtomicBool::new(false));
+        let new = || Worker {
+            records: vec![],
+            cells: vec![],
+            crossings: Crossings::default(),
+            order: Order::default(),
+            canvas: Canvas::new(),
+        };
+        let drawn: Vec<Done> = targets
+            .par_iter_mut()
+            .with_max_len(1)
+            .map_init(new, |worker, target| {
+                if stopped.load(Relaxed) {
+                    return Done::default();
+                }
+                let tile = self.tile(worker, frame, &scene, [&cells, &faces], target);
+                if (frame.progress)((done.fetch_add(1, Relaxed) + 1) as f64 / tiles as f64).is_break() {
+                    stopped.store(true, Relaxed);
+                }
+                tile
+            })
+            .collect();
+        let mut counts = Counts::default();
+        let mut covered = 0;
+        let mut flawed = vec![];
+        for tile in drawn {
+            counts.cells += tile.cells;
+            counts.fragments += tile.fragments;
+            covered += tile.covered;
+            for (pixel, flaw) in tile.flawed {
+                flawed.push(pixel);
+                match flaw {
+                    Flaw::None => {}
+                    Flaw::Overlap => counts.redrawn[0] += 1,
+                    Flaw::Gap => counts.redrawn[1] += 1,
+                    Flaw::Boundary => counts.redrawn[2] += 1,
+                    Flaw::Dense => counts.redrawn[3] += 1,
+                }
+            }
+        }
+        #[cfg(test)]
+        let covered = if self.fault.is_some() { u64::MAX } else { covered };
+        if flawed.len() > 256 && flawed.len() as f64 > MOST_REDRAWN * covered as f64 {
+            return walk(frame, Counts { handed_over: Some("too many pixels failed their checks"), ..counts });
+        }
+        let Frame { integral, color, view, .. } = *frame;
+        let again = cpu::render_pixels(geometry, values, integral, color, view, &flawed);
+        flawed.iter().zip(again).for_each(|(&i, p)| pixels[i] = p);
+        (pixels, counts)
+    }
+
+    /// Draws one tile.
+    fn tile<const N: usize>(
+        &self,
+        worker: &mut Worker<N>,
+        frame: &Frame<N>,
+        scene: &Scene<N>,
+        [cells, faces]: [&Dealt; 2],
+        target: &mut Target,
+    ) -> Done {
+        let t = target.index;
+        let mut done = Done { cells: cells.len(t) as u64, ..Done::default() };
+        if done.cells == 0 && faces.len(t) == 0 {
+            return done;
+        }
+        let columns = scene.lens.tiles()[0];
+        let corner = [(t % columns) as u32 * TILE, (t / columns) as u32 * TILE];
+        worker.crossings.clear();
+        for f in faces.of(t) {
+            let face = &scene.geometry.boundary.faces[f as usize];
+            if let Some(b) = coarse::bounds(scene.lens, &scene.geometry.points, scene.places, face.points) {
+                worker.crossings.add(scene.geometry, scene.lens, face, b, corner);
+            }
+        }
+        worker.crossings.sort();
+        worker.cells.clear();
+        worker.cells.extend(cells.of(t));
+        worker.canvas.clear(scene, frame.view, &worker.crossings, corner);
+        let fresh = || vec![0; scene.geometry.cells.len()];
+        let mut place = self.spare.lock().ok().and_then(|mut s| s.pop()).unwrap_or_else(fresh);
+        if place.len() != scene.geometry.cells.len() {
+            place = fresh();
+        }
+        let fault = || {
+            #[cfg(test)]
+            return self.fault;
+            #[cfg(not(test))]
+            ()
+        };
+        draw(self.level, worker, frame, scene, corner, &mut place, fault());
+        if let Ok(mut spare) = self.spare.lock() {
+            spare.push(place);
+        }
+        let Worker { canvas, crossings, .. } = worker;
+        let width = scene.lens.size[0] as usize;
+        let size = [target.rows[0].len() as u32, target.rows.len() as u32];
+        canvas.finish(scene, &frame.integral, crossings, size, frame.color, |i, j, light, flaw| {
+            target.rows[j as usize][i as usize] = light;
+            done.covered += u64::from(crossings.any(order::place(i, j)));
+            if flaw != Flaw::None {
+                done.flawed.push(((corner[1] + j) as usize * width + (corner[0] + i) as usize, flaw));
+            }
+        });
+        done.fragments = std::mem::take(&mut canvas.fragments);
+        done
+    }
+}
+
+#[cfg(not(test))]
+type Fault = ();
+#[cfg(test)]
+type Fault = Option<tests::Fault>;
+
+/// As [`sweep`], in the instructions of `level`. Each set of them is another copy of all that the sweep is, so of x86's there are two:
+/// AVX-512 gained 4 to 8 % in a trial.
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+fn draw<const N: usize>(
+    level: Level,
+    worker: &mut Worker<N>,
+    frame: &Frame<N>,
+    scene: &Scene<N>,
+    corner: [u32; 2],
+    place: &mut [u32],
+    fault: Fault,
+) {
+    if let Some(avx2) = level.as_avx2() {
+        avx2.vectorize(
+            #[inline(always)]
+            || sweep(avx2, worker, frame, scene, corner, place, fault),
+        );
+    } else if let Some(sse2) = level.as_sse2() {
+        sse2.vectorize(
+            #[inline(always)]
+            || sweep(sse2, worker, frame, scene, corner, place, fault),
+        );
+    }
+}
+
+/// As [`sweep`], in the instructions of `level`.
+#[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+fn draw<const N: usize>(
+    level: Level,
+    worker: &mut Worker<N>,
+    frame: &Frame<N>,
+    scene: &Scene<N>,
+    corner: [u32; 2],
+    place: &mut [u32],
+    fault: Fault,
+) {
+    fearless_simd::dispatch!(level, simd => sweep(simd, worker, frame, scene, corner, place, fault));
+}
+
+/// Sets up, orders and draws the cells of a tile.
+#[inline(always)]
+fn sweep<S: Simd, const N: usize>(
+    simd: S,
+    worker: &mut Worker<N>,
+    frame: &Frame<N>,
+    scene: &Scene<N>,
+    corner: [u32; 2],
+    place: &mut [u32],
+    #[allow(unused_variables, reason = "tests alone inject faults")] fault: Fault,
+) {
+    let Worker { records, cells, crossings, order, canvas } = worker;
+    records.clear();
+    for four in cells.chunks(4) {
+        setup::set_up(simd, scene, four, corner, records);
+    }
+    order.find(scene.geometry, records, crossings, place);
+    #[cfg(test)]
+    if let Some(fault) = fault {
+        let mut sequence = vec![];
+        while let Some(i) = order.next() {
+            sequence.push(i);
+        }
+        fault.inject(&mut sequence);
+        sequence.iter().for_each(|&i| canvas.draw(simd, scene, &frame.integral, crossings, &records[i]));
+        return;
+    }
+    while let Some(i) = order.next() {
+        if canvas.is_done() {
+            break;
+        }
+        canvas.draw(simd, scene, &frame.integral, crossings, &records[i]);
+    }
+}
+
+/// Has the walk draw all of a frame.
+fn walk<const N: usize>(frame: &Frame<N>, mut counts: Counts) -> (Vec<[f32; 4]>, Counts) {
+    let Frame { geometry, values, integral, view, color, progress } = *frame;
+    let (image, walked) = cpu::render(geometry, values, integral, color, view, progress);
+    counts.walked = walked;
+    (image.pixels, counts)
+}
+
+/// The tiles of an image.
+fn targets<'a>(pixels: &'a mut [[f32; 4]], lens: &Lens) -> Vec<Target<'a>> {
+    let [columns, tiles] = lens.tiles();
+    let mut targets: Vec<Target> = (0..tiles).map(|index| Target { index, rows: vec![] }).collect();
+    for (j, row) in pixels.chunks_mut(lens.size[0] as usize).enumerate() {
+        for (i, part) in row.chunks_mut(TILE as usize).enumerate() {
+            targets[j / TILE as usize * columns + i].rows.push(part);
+        }
+    }
+    targets
+}

@@ -1,0 +1,278 @@
+//! Coarse: what a frame does once for all points, cells and boundary faces. Points are projected, and each cell is dealt to the
+//! tiles of the image whose pixel centres its outline may hold.
+//!
+//! In a perspective view p − eye = w (d₀ + X d₁ + Y d₂): w is the depth along the view direction, (X, Y) the place on the image in
+//! pixels, counted from the centre of the first one. In a parallel view p − o₀ = X o₁ + Y o₂ + w d₀. The inverse of either 3 × 3
+//! matrix gives h = (X w, Y w, w), or (X, Y, w).
+//!
+//! Depths along a pixel's ray are compared as keys, V = w₀ − w₀²/w in perspective (parallel: w − w₀), which are linear on the
+//! screen on every plane. w₀ is near the near side of the mesh, so keys are as small as the mesh is, wherever the camera is.
+
+use crate::geometry::Geometry;
+use crate::view::View;
+use glam::{DMat3, DVec2, DVec3};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Width and height of a tile in pixels.
+pub(super) const TILE: u32 = 32;
+
+/// Parts that cells are dealt out in: bits do not depend on the number of threads.
+const PARTS: usize = 64;
+
+/// Depth, in normalised units, in front of which nothing in perspective views is drawn.
+pub(super) const NEAREST: f64 = 1e-7;
+
+/// How far from its centre, in columns and rows, the ray of a pixel passes: edges of meshes that are aligned with the
+/// view do not run through rays then.
+pub(super) const ASIDE: DVec2 = DVec2::new(1.3e-7, 0.9e-7);
+
+/// How points become places on the image.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Lens {
+    origin: DVec3,
+    inverse: DMat3,
+    direction: [DVec3; 3],
+    /// Rays meet in the eye.
+    pub(super) meet: bool,
+    /// The depth that keys count from.
+    pub(super) reference: f64,
+    /// Columns and rows of pixels.
+    pub(super) size: [u32; 2],
+    /// Whether anything but the eye limits rays where the mesh is.
+    pub(super) limited: bool,
+}
+
+impl Lens {
+    /// None if the mesh lies behind the eye.
+    pub(super) fn new(geometry: &Geometry, view: &View) -> Option<Self> {
+        let fan = view.fan(geometry.centre, geometry.scale, f64::INFINITY);
+        let (origin, direction) = (fan.by_pixel(fan.origin, view.size()), fan.by_pixel(fan.direction, view.size()));
+        let meet = view.eye().is_some();
+        let across = if meet { [direction[1], direction[2]] } else { [origin[1], origin[2]] };
+        let inverse = DMat3::from_cols(across[0], across[1], direction[0]).inverse();
+        let mut lens =
+            Lens { origin: origin[0], inverse, direction, meet, reference: 0.0, size: view.size(), limited: false };
+        let [low, high] = geometry.boundary.bounds();
+        let corners = (0..8).map(|k| {
+            let pick = |bit: usize, l: f64, h: f64| if k >> bit & 1 == 1 { h } else { l };
+            lens.place(DVec3::new(pick(0, low.x, high.x), pick(1, low.y, high.y), pick(2, low.z, high.z))).z
+        });
+        let (near, far) = corners.fold((f64::INFINITY, f64::NEG_INFINITY), |(n, f), w| (n.min(w), f.max(w)));
+        if meet && far <= NEAREST {
+            return None;
+        }
+        lens.reference = if meet { near.max(0.5 * far) } else { near };
+        let cut = (fan.near > near && fan.near > 0.0) || (!meet && fan.near > near) || fan.far < far;
+        lens.limited = cut || !view.clipping_planes().is_empty() || view.has_depth();
+        Some(lens)
+    }
+
+    /// h of a point.
+    #[inline(always)]
+    pub(super) fn place(&self, p: DVec3) -> DVec3 {
+        self.inverse * (p - self.origin)
+    }
+
+    /// h of a difference of points.
+    #[inline(always)]
+    pub(super) fn turn(&self, d: DVec3) -> DVec3 {
+        self.inverse * d
+    }
+
+    /// Rows of the matrix that [`Self::turn`] is.
+    pub(super) fn rows(&self) -> [DVec3; 3] {
+        [0, 1, 2].map(|k| self.inverse.row(k))
+    }
+
+    /// Column and row of h.
+    #[inline(always)]
+    pub(super) fn pixel(&self, h: DVec3) -> DVec2 {
+        if self.meet { h.truncate() / h.z } else { h.truncate() }
+    }
+
+    /// Whether columns, rows and depth are a left-handed system.
+    pub(super) fn mirrored(&self) -> bool {
+        self.inverse.determinant() < 0.0
+    }
+
+    /// The key of a depth.
+    pub(super) fn key(&self, w: f64) -> f64 {
+        match self.meet {
+            true if w <= 0.0 => f64::NEG_INFINITY,
+            true => self.reference - self.reference * (self.reference / w),
+            false => w - self.reference,
+        }
+    }
+
+    /// The depth of a key: the inverse of [`Self::key`].
+    pub(super) fn depth(&self, key: f64) -> f64 {
+        match self.meet {
+            true if key >= self.reference => f64::INFINITY,
+            true => self.reference * (self.reference / (self.reference - key)),
+            false => key + self.reference,
+        }
+    }
+
+    /// The length of a ray for each unit of depth.
+    pub(super) fn stretch(&self, column: f64, row: f64) -> f64 {
+        let [middle, across, down] = self.direction;
+        if self.meet { (middle + across * column + down * row).length() } else { middle.length() }
+    }
+
+    /// The keys between which pixel (`i`, `j`) is drawn.
+    pub(super) fn limits(&self, geometry: &Geometry, view: &View, i: u32, j: u32) -> [f64; 2] {
+        let ray = view.ray(i, j);
+        if ray.t_min >= ray.t_max {
+            return [f64::INFINITY, f64::NEG_INFINITY];
+        }
+        let start = self.place((ray.origin - geometry.centre) * geometry.scale).z;
+        let slope = self.turn(ray.direction).z * geometry.scale;
+        [ray.t_min, ray.t_max].map(|t| match (self.meet, t.is_finite()) {
+            (_, false) => t,
+            (true, _) => self.key(t * slope),
+            (false, _) => self.key(start + t * slope),
+        })
+    }
+
+    /// Number of tiles in a row and in all.
+    pub(super) fn tiles(&self) -> [usize; 2] {
+        let [columns, rows] = self.size.map(|n| n.div_ceil(TILE) as usize);
+        [columns, columns * rows]
+    }
+}
+
+/// First and last column, first and last row of pixels.
+pub(super) type Bounds = [u32; 4];
+
+/// The points of the mesh on the image, in columns and rows; NaN where they are not before the eye.
+pub(super) fn project(lens: &Lens, points: &[DVec3], places: &mut Vec<[f32; 2]>) {
+    points
+        .par_iter()
+        .with_min_len(4096)
+        .map(|&p| {
+            let h = lens.place(p);
+            let at = if lens.meet && h.z <= NEAREST { DVec2::NAN } else { lens.pixel(h) };
+            [at.x as f32, at.y as f32]
+        })
+        .collect_into_vec(places);
+}
+
+/// The pixels whose centres the outline of a cell or face with these corners may hold.
+#[inline(always)]
+pub(super) fn bounds<const K: usize>(
+    lens: &Lens,
+    points: &[DVec3],
+    places: &[[f32; 2]],
+    corners: [u32; K],
+) -> Option<Bounds> {
+    let at = corners.map(|p| places[p as usize]);
+    let (mut low, mut high) = (at[0], at[0]);
+    for p in &at[1..] {
+        for k in 0..2 {
+            low[k] = low[k].min(p[k]);
+            high[k] = high[k].max(p[k]);
+        }
+    }
+    if at.iter().any(|p| p[0].is_nan()) {
+        [low, high] = clipped(lens, &corners.map(|p| points[p as usize]))?;
+    }
+    // Single floats round places far aside to thousandths of a pixel.
+    let first = |v: f32| (v - 0.01 - v.abs() * 1e-6).ceil();
+    let last = |v: f32| (v + 0.01 + v.abs() * 1e-6).floor();
+    let end = lens.size.map(|n| (n - 1) as f32);
+    let (l, r) = (first(low[0]).max(0.0), last(high[0]).min(end[0]));
+    let (t, b) = (first(low[1]).max(0.0), last(high[1]).min(end[1]));
+    (l <= r && t <= b).then(|| [l as u32, r as u32, t as u32, b as u32])
+}
+
+/// Least and greatest places of what of a cell or face lies before the eye; none if nothing does.
+#[cold]
+fn clipped(lens: &Lens, corners: &[DVec3]) -> Option<[[f32; 2]; 2]> {
+    let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+    let mut take = |h: DVec3| {
+        let at = lens.pixel(h);
+        (low, high) = (low.min(at), high.max(at));
+    };
+    for (k, &p) in corners.iter().enumerate() {
+        let a = lens.place(p);
+        if a.z > NEAREST {
+            take(a);
+        }
+        for &q in &corners[..k] {
+            let b = lens.place(q);
+            if (a.z > NEAREST) != (b.z > NEAREST) {
+                let cut = a + (b - a) * ((NEAREST - a.z) / (b.z - a.z));
+                take(DVec3::new(cut.x, cut.y, NEAREST));
+            }
+        }
+    }
+    let far = DVec2::splat(1e9);
+    let float = |v: DVec2| v.clamp(-far, far).to_array().map(|v| v as f32);
+    (low.x <= high.x).then(|| [float(low), float(high)])
+}
+
+/// What was dealt to each tile, in ascending order.
+#[derive(Debug, Default)]
+pub(super) struct Dealt {
+    parts: Vec<Part>,
+}
+
+/// What was dealt of one part of the items: tile t has `items[start[t]..start[t + 1]]`.
+#[derive(Debug, Default)]
+struct Part {
+    start: Vec<u32>,
+    items: Vec<u32>,
+}
+
+impl Dealt {
+    /// Deals items 0 to `n` to the tiles that their bounds meet.
+    pub(super) fn new(lens: &Lens, n: usize, bounds: impl Fn(usize) -> Option<Bounds> + Sync) -> Self {
+        let [columns, tiles] = lens.tiles();
+        let parts =
+            (0..PARTS).into_par_iter().map(|k| deal(columns, tiles, n * k / PARTS..n * (k + 1) / PARTS, &bounds));
+        Dealt { parts: parts.collect() }
+    }
+
+    /// The items of tile `t`.
+    pub(super) fn of(&self, t: usize) -> impl Iterator<Item = u32> + '_ {
+        let range = move |p: &Part| p.start[t] as usize..p.start[t + 1] as usize;
+        self.parts.iter().flat_map(move |p| p.items[range(p)].iter().copied())
+    }
+
+    /// How many items tile `t` has.
+    pub(super) fn len(&self, t: usize) -> usize {
+        self.parts.iter().map(|p| (p.start[t + 1] - p.start[t]) as usize).sum()
+    }
+}
+
+fn deal(columns: usize, tiles: usize, range: Range<usize>, bounds: &(impl Fn(usize) -> Option<Bounds> + Sync)) -> Part {
+    let mut start = vec![0_u32; tiles + 1];
+    // Tiles of each item that is seen: first and last column and row.
+    let mut seen = Vec::with_capacity(range.len());
+    for i in range {
+        let Some(b) = bounds(i) else { continue };
+        let [l, r, t, b] = b.map(|v| (v / TILE) as u16);
+        seen.push((i as u32, [l, r, t, b]));
+        for y in t..=b {
+            for x in l..=r {
+                start[y as usize * columns + x as usize + 1] += 1;
+            }
+        }
+    }
+    for t in 0..tiles {
+        start[t + 1] += start[t];
+    }
+    let mut next = start.clone();
+    let mut items = vec![0; start[tiles] as usize];
+    for (i, [l, r, t, b]) in seen {
+        for y in t..=b {
+            for x in l..=r {
+                let at = &mut next[y as usize * columns + x as usize];
+                items[*at as usize] = i;
+                *at += 1;
+            }
+        }
+    }
+    Part { start, items }
+}

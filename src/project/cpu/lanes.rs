@@ -1,0 +1,159 @@
+//! What pieces of rays emit and absorb, eight at a time: the equations are those of [`crate::integral`].
+
+use crate::integral::{GAUSS_6, MILD, PANEL, Piece};
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x8, u32x8};
+
+/// Optical depth up to which the shorter series holds.
+const FAINT: f32 = 1.0 / 8.0;
+
+/// Opacity and the weights of the emission at both ends of pieces of optical depths `x` and `y`, none below 0.
+#[inline(always)]
+pub(super) fn piece<S: Simd>(simd: S, x: f32x8<S>, y: f32x8<S>, direct: bool) -> [f32x8<S>; 3] {
+    let steepest = x.max(y);
+    let most = |depth: f32| steepest.simd_gt(f32x8::splat(simd, depth)).to_bitmask();
+    if !direct && most(FAINT) == 0 {
+        return faint(simd, x, y);
+    }
+    if most(MILD as f32) == 0 {
+        return mild(simd, x, y, direct);
+    }
+    let [alpha, front, back] = moderate(simd, x, y, direct);
+    let deep = most(PANEL as f32);
+    // Faint lanes beside deeper ones keep their digits.
+    let [a, f, b] = mild(simd, x, y, direct);
+    let near = steepest.simd_le(f32x8::splat(simd, MILD as f32));
+    let all = [near.select(a, alpha), near.select(f, front), near.select(b, back)];
+    if deep == 0 { all } else { deeper(simd, x, y, direct, deep, all) }
+}
+
+/// Up to a depth of 1/8: [`mild`] with fewer terms; what is left out is below 1e-6 of the opacity.
+#[inline(always)]
+fn faint<S: Simd>(simd: S, x: f32x8<S>, y: f32x8<S>) -> [f32x8<S>; 3] {
+    let of = |v: f32| f32x8::splat(simd, v);
+    let (depth, rise) = ((x + y) * 0.5, y - x);
+    let (square, h) = (depth * depth, depth * 0.5);
+    let q = h * (of(1.0) - h * (of(0.5) - h * (of(1.0 / 6.0) - h * (1.0 / 24.0))));
+    let even = square * (1.0 / 24.0);
+    let bent = (square * (1.0 / 480.0) + 1.0 / 12.0) + rise * (1.0 / 240.0);
+    let e = of(1.0) - q;
+    let alpha = e * depth * (even + 1.0);
+    let back = e * (q + even + rise * bent);
+    [alpha, alpha - back, back]
+}
+
+/// Up to a depth of 1: `Piece::mild`.
+#[inline(always)]
+fn mild<S: Simd>(simd: S, x: f32x8<S>, y: f32x8<S>, direct: bool) -> [f32x8<S>; 3] {
+    let of = |v: f32| f32x8::splat(simd, v);
+    let (depth, rise) = ((x + y) * 0.5, y - x);
+    let (square, h) = (depth * depth, depth * 0.5);
+    let mut q = h * (1.0 / 40_320.0);
+    for factorial in [5040.0_f32, 720.0, 120.0, 24.0, 6.0, 2.0, 1.0] {
+        q = h * (of(1.0 / factorial) - q);
+    }
+    let even = square * (square * (square * (1.0 / 322_560.0) + 1.0 / 1920.0) + 1.0 / 24.0);
+    let once = square * (square * (1.0 / 53_760.0) + 1.0 / 480.0) + 1.0 / 12.0;
+    let twice = square * (1.0 / 13_440.0) + 1.0 / 240.0;
+    let thrice = square * (1.0 / 483_840.0) + 1.0 / 6720.0 + rise * (1.0 / 241_920.0);
+    let bent = once + rise * (twice + rise * thrice);
+    let e = of(1.0) - q;
+    let alpha = e * depth * (even + 1.0);
+    if direct {
+        let seen = even + 1.0 + rise * bent;
+        let back = e * (seen * 0.5 - depth * bent);
+        return [alpha, e * seen - back, back];
+    }
+    let back = e * (q + even + rise * bent);
+    [alpha, alpha - back, back]
+}
+
+/// Up to a depth of 4: Gauss–Legendre sums.
+#[inline(always)]
+fn moderate<S: Simd>(simd: S, x: f32x8<S>, y: f32x8<S>, direct: bool) -> [f32x8<S>; 3] {
+    let zero = f32x8::splat(simd, 0.0);
+    let mut sum = [zero; 3];
+    for [node, weight] in GAUSS_6 {
+        let u = node as f32;
+        let rise = (y - x) * u;
+        let seen = exp(simd, (x + rise * 0.5) * -u) * weight as f32;
+        let absorbed = (x + rise) * seen;
+        let emitted = if direct { seen } else { absorbed };
+        sum = [sum[0] + absorbed, sum[1] + emitted * (1.0 - u), sum[2] + emitted * u];
+    }
+    sum
+}
+
+/// Any depth, one lane after another.
+#[inline(never)]
+fn deeper<S: Simd>(simd: S, x: f32x8<S>, y: f32x8<S>, direct: bool, lanes: u64, all: [f32x8<S>; 3]) -> [f32x8<S>; 3] {
+    let (x, y): ([f32; 8], [f32; 8]) = (x.into(), y.into());
+    let mut all: [[f32; 8]; 3] = all.map(Into::into);
+    for l in (0..8).filter(|l| lanes >> l & 1 == 1) {
+        let piece = Piece::new(x[l], y[l], direct);
+        (all[0][l], all[1][l], all[2][l]) = (piece.alpha, piece.front, piece.back);
+    }
+    all.map(|v| f32x8::from_slice(simd, &v))
+}
+
+/// eˣ for x ≤ 0: `real::exp`.
+#[inline(always)]
+#[allow(clippy::excessive_precision, reason = "ln 2 in two parts: the first is exact in f32")]
+fn exp<S: Simd>(simd: S, x: f32x8<S>) -> f32x8<S> {
+    const ROUND: f32 = 12_582_912.0;
+    let of = |v: f32| f32x8::splat(simd, v);
+    let clamped = x.max(of(-87.0));
+    let shifted = clamped * std::f32::consts::LOG2_E + ROUND;
+    let k = shifted - ROUND;
+    let r = (clamped - k * 0.693_359_375) - k * -2.121_944_4e-4;
+    let mut p = of(1.0 / 5040.0);
+    for c in [1.0 / 720.0, 1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5, 1.0, 1.0] {
+        p = p * r + of(c);
+    }
+    let bits: u32x8<S> = shifted.bitcast();
+    let biased = bits - u32x8::splat(simd, ROUND.to_bits() - 127);
+    let scale: f32x8<S> = (biased << 23).bitcast();
+    x.simd_lt(of(-87.0)).select(of(0.0), p * scale)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fearless_simd::{Level, dispatch};
+
+    #[test]
+    fn lanes_are_pieces() {
+        let depths = [0.0, 1e-30, 1e-6, 1e-3, 0.03, 0.1, 0.12, 0.13, 0.3, 0.9, 1.0, 1.1, 2.0, 3.9, 4.1, 9.0, 40.0, 1e6];
+        for direct in [false, true] {
+            for x in depths {
+                for y in depths {
+                    // Alone, and beside deeper ones.
+                    for other in [0.0, 0.5, 3.0, 20.0] {
+                        let lanes = |v: f32| [v, v, other, v, other, v, v, v];
+                        let (a, b) = (lanes(x), lanes(y));
+                        let got = dispatch!(Level::new(), simd => {
+                            piece(simd, f32x8::from_slice(simd, &a), f32x8::from_slice(simd, &b), direct)
+                                .map(<[f32; 8]>::from)
+                        });
+                        let want = Piece::new(f64::from(x), f64::from(y), direct);
+                        for (k, want) in [want.alpha, want.front, want.back].into_iter().enumerate() {
+                            for l in [0, 7] {
+                                let error = (f64::from(got[k][l]) - want).abs();
+                                let bound = if direct && k > 0 {
+                                    1e-6
+                                } else {
+                                    1e-5 * want.abs() + 3e-7 * want.abs().max(1e-2)
+                                };
+                                assert!(
+                                    error <= bound.min(1e-6),
+                                    "{k} at {x}, {y} beside {other}: {} not {want}",
+                                    got[k][l]
+                                );
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
