@@ -238,7 +238,7 @@ mod tests {
 
     /// The name of what is chosen of a mesh with these arrays of points.
     fn of(arrays: Vec<Array>, roles: &[(Role, &str)]) -> String {
-        let plain = generate::tetrahedra(1);
+        let plain = generate::tetrahedra(2);
         let mut mesh = Mesh::new(plain.points().to_vec(), plain.cells().clone(), arrays, vec![]).unwrap();
         let roles = roles.iter().map(|(role, name)| (*role, (*name).to_owned())).collect();
         mesh.set_attributes(Attributes { roles, left_out: vec![] }, Attributes::default());
@@ -247,7 +247,7 @@ mod tests {
 
     #[test]
     fn identifiers_and_coordinates_come_last() {
-        let points = generate::tetrahedra(1).points().to_vec();
+        let points = generate::tetrahedra(2).points().to_vec();
         let n = points.len();
         let odd = |name: &str| array(name, 1, Values::I32((0..n as i32).map(|i| i * 7 % 5).collect()));
         for name in [
@@ -292,7 +292,7 @@ mod tests {
 
     #[test]
     fn the_active_array_comes_first() {
-        let n = generate::tetrahedra(1).points().len();
+        let n = generate::tetrahedra(2).points().len();
         let real = |name: &str| array(name, 1, Values::F64((0..n).map(|i| 0.3 * i as f64).collect()));
         let vectors = array("v", 3, Values::F32((0..3 * n).map(|i| i as f32 * 0.7).collect()));
         let all = || vec![real("a"), vectors.clone(), real("b")];

@@ -160,7 +160,7 @@ fn apart(sorted: &[f64]) -> Option<f64> {
 fn shown(sorted: &[f64]) -> [f64; 2] {
     let quantile = |q: f64| sorted[((sorted.len() - 1) as f64 * q) as usize];
     let (lo, hi, a, b) = (quantile(0.0), quantile(1.0), quantile(0.01), quantile(0.99));
-    if b > a && hi / 4.0 - lo / 4.0 > b - a {
+    if sorted.len() >= FEWEST && b > a && hi / 4.0 - lo / 4.0 > b - a {
         let margin = (b - a) / 10.0;
         return [lo.max(a - margin), hi.min(b + margin)];
     }
