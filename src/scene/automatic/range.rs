@@ -181,7 +181,8 @@ mod tests {
         for n in [8, 27, 1000, 400_000] {
             let plain = ramp(n);
             assert_eq!(trimmed(&plain), [273.0, 303.0]);
-            for exponent in 4..=38 {
+            // Sorting many takes long.
+            for exponent in (4..=38).step_by(if n > 1000 { 17 } else { 1 }) {
                 for sign in [-1.0, 1.0] {
                     // One, and where there are many, a fiftieth.
                     for each in [n, 50] {
