@@ -321,11 +321,13 @@ fn very_flat_meshes_are_drawn() {
         };
         let expected = Engine::Reference.image(&scene, &view);
         assert!(expected.pixels.iter().filter(|p| p[3] > 0.1).count() > 5, "{k}: there is something to see");
-        report.hold(&format!("twin, {k}"), &TWIN.image(&scene, &view), &expected, BOUND);
+        // The reference moves rays that lie in a face aside by 1e-11, which is much of a needle's width.
+        let bound = if k == 1 { 2e-3 } else { BOUND };
+        report.hold(&format!("twin, {k}"), &TWIN.image(&scene, &view), &expected, bound);
         for renderer in devices.iter_mut().flatten() {
             set(renderer, &scene);
             let got = renderer.render(&view, &|_| ()).unwrap();
-            report.hold(&format!("{}, {k}", renderer.stats().engine), &got, &expected, BOUND);
+            report.hold(&format!("{}, {k}", renderer.stats().engine), &got, &expected, bound);
         }
     }
     // A mesh that becomes flat, and is no longer.

@@ -118,7 +118,7 @@ fn measure(options: &Options, job: &Job, renderer: &mut Renderer) -> Result<Run>
     });
     let views: Vec<View> = views.collect::<Result<_>>()?;
     renderer.check_room(job.mesh.points().len(), &job.tetrahedra)?;
-    progress::busy("matching faces", || renderer.set_mesh(&job.mesh, job.tetrahedra.clone()));
+    progress::during("matching faces", |p| renderer.set_mesh_with_progress(&job.mesh, job.tetrahedra.clone(), p));
     renderer.set_field(&job.field)?;
     renderer.set_transfer(&job.scene.transfer);
     let name = renderer.stats().adapter.clone();

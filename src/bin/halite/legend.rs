@@ -27,7 +27,7 @@ pub(crate) struct Legend {
 const PANEL: f32 = 0.6;
 
 /// Numbers on the bar, about.
-const NUMBERS: f64 = 6.0;
+const NUMBERS: f64 = 6.5;
 
 impl Legend {
     /// The legend of `field`, which `scalars` are; none if its colours are its own, or there is one at most.
@@ -208,7 +208,7 @@ mod tests {
         let of = |axis: Axis| numbers(&axis).into_iter().map(|n| n.1).collect::<Vec<_>>();
         assert_eq!(of(Axis::linear([0.0, 1.0])), ["0", "0.2", "0.4", "0.6", "0.8", "1"]);
         assert_eq!(of(Axis::linear([-3.3, 8.8])), ["-2", "0", "2", "4", "6", "8"].map(String::from));
-        assert_eq!(of(Axis::linear([293.15, 913.15])), ["400", "600", "800"]);
+        assert_eq!(of(Axis::linear([293.15, 913.15])), ["300", "400", "500", "600", "700", "800", "900"]);
         assert_eq!(of(Axis::linear([1e6 + 0.25, 1e6 + 0.75])).len(), 5);
         assert_eq!(of(Axis::linear([0.0, 5e9]))[1], "1e9");
         assert_eq!(of(Axis::logarithmic([1e-3, 1e3]).unwrap()), ["0.001", "0.01", "0.1", "1", "10", "100", "1000"]);

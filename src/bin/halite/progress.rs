@@ -16,14 +16,6 @@ pub(crate) fn during<T>(what: &'static str, work: impl FnOnce(&(dyn Fn(f64) + Sy
     done
 }
 
-/// Runs `work` that does not say how much is done, and shows that it goes on.
-pub(crate) fn busy<T>(what: &'static str, work: impl FnOnce() -> T) -> T {
-    let bar = shown(ProgressBar::new_spinner(), what, "{msg:14} {spinner} {elapsed}");
-    let done = work();
-    bar.finish_and_clear();
-    done
-}
-
 fn shown(bar: ProgressBar, what: &'static str, template: &str) -> ProgressBar {
     let bar = bar.with_message(what).with_finish(ProgressFinish::AndClear);
     if let Ok(style) = ProgressStyle::with_template(template) {

@@ -262,7 +262,7 @@ fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut Steps) -> R
     }
     let load_ms = ms(start);
     let start = Instant::now();
-    let split = progress::busy("splitting", || Tetrahedra::new(&mesh));
+    let split = progress::during("splitting", |p| Tetrahedra::with_progress(&mesh, p));
     let mut tetrahedra = split.with_context(|| path.display().to_string())?;
     let split_ms = ms(start);
     tetrahedra.log();
@@ -504,7 +504,7 @@ pub(crate) fn draw(job: Job, renderer: &mut Renderer) -> Result<Drawn> {
     let Job { mesh, tetrahedra, field, scene, load_ms, split_ms, .. } = job;
     let (view, behind) = scene.view()?;
     renderer.check_room(mesh.points().len(), &tetrahedra)?;
-    progress::busy("matching faces", || renderer.set_mesh(&mesh, tetrahedra));
+    progress::during("matching faces", |p| renderer.set_mesh_with_progress(&mesh, tetrahedra, p));
     renderer.set_field(&field)?;
     renderer.set_transfer(&scene.transfer);
     // The renderer has its own copy, and the meshes that people draw are large.

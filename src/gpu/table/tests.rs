@@ -18,7 +18,7 @@ fn most_work() -> u32 { return 1000u; }
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if id.x >= arrayLength(&cases) { return; }
     let c = cases[id.x];
-    outcomes[id.x] = tabulated(c.x, c.y, c.z);
+    outcomes[id.x] = looked_up(c.x, c.y, c.z);
 }";
 
 fn source(table: &Lookup, direct: bool) -> String {

@@ -80,9 +80,7 @@ impl Sample {
                 (0..several).map(move |i| {
                     let weights = inside(t + i);
                     let at = |k: usize| match field.association() {
-                        Association::Point => {
-                            (0..4).map(|c| weights[c] * values[corners[c] as usize * n + k]).sum()
-                        }
+                        Association::Point => (0..4).map(|c| weights[c] * values[corners[c] as usize * n + k]).sum(),
                         Association::Cell => {
                             let cell = tetrahedra.cell.as_ref().map_or(t, |cell| cell[t] as usize);
                             values[cell * n + k]
@@ -334,8 +332,11 @@ mod tests {
             let values = Values::F64(mesh.points().iter().map(|&p| f(p)).collect());
             let array = Array { name: "f".into(), components: 1, values };
             let field = Field::from_array(&array, Association::Point, Component::Index(0)).unwrap();
-            let scalars =
-                Scalars { name: "f".into(), association: Some(Association::Point), component: Some(Component::Index(0)) };
+            let scalars = Scalars {
+                name: "f".into(),
+                association: Some(Association::Point),
+                component: Some(Component::Index(0)),
+            };
             let wishes = Wishes::default();
             let transfer = transfer(&mesh, &tetrahedra, &scalars, &field, camera, &wishes).unwrap();
             let mut renderer = crate::render::Renderer::with_device(2, crate::gpu::DeviceChoice::Cpu).unwrap();

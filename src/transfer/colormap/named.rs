@@ -37,6 +37,7 @@ const VIRIDIS: [Knot; 16] = [
 ];
 
 #[rustfmt::skip]
+#[allow(clippy::approx_constant, reason = "a shade of red, not an angle")]
 const PLASMA: [Knot; 15] = [
     [0.0, 0.0504, 0.0298, 0.5280], [6.0, 0.1151, 0.0236, 0.5555], [20.0, 0.2212, 0.0165, 0.6021],
     [41.0, 0.3564, 0.0038, 0.6478], [58.0, 0.4596, 0.0036, 0.6603], [69.0, 0.5235, 0.0245, 0.6529],
