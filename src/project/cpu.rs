@@ -53,7 +53,7 @@ pub(crate) struct Counts {
     pub(crate) cells: u64,
     /// Segments of rays in cells.
     pub(crate) fragments: u64,
-    /// Pixels drawn again: as cells overlapped, as a part of the mesh was missing, as the boundary was not closed, as f32
+    /// Pixels drawn again: as cells overlapped, as a part of the mesh was missing, as the boundary said otherwise, as f32
     /// was too coarse.
     pub(crate) redrawn: [u64; 4],
     /// What the walk did.
@@ -164,7 +164,7 @@ impl Sweep {
                     Flaw::Overlap => counts.redrawn[0] += 1,
                     Flaw::Gap => counts.redrawn[1] += 1,
                     Flaw::Boundary => counts.redrawn[2] += 1,
-                    Flaw::Dense => counts.redrawn[3] += 1,
+                    Flaw::Coarse => counts.redrawn[3] += 1,
                 }
             }
         }

@@ -72,9 +72,10 @@ pub struct SweepStats {
     pub redrawn_overlaps: u64,
     /// Likewise, as a part of the mesh was missing.
     pub redrawn_gaps: u64,
-    /// Likewise, as the ray enters the mesh not as often as it leaves.
+    /// Likewise, as the ray enters the mesh not as often as it leaves, or is outside where a cell was drawn.
     pub redrawn_boundary: u64,
-    /// Likewise, as light comes through cells so dense that lengths in f32 are too coarse.
+    /// Likewise, as light comes through cells so dense that lengths in f32 are too coarse, or as the largest value is of a
+    /// cell with such a large one that values in f32 are.
     pub redrawn_dense: u64,
     /// Why the walk drew all of the frame, if it did.
     pub handed_over: Option<String>,

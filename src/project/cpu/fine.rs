@@ -35,10 +35,11 @@ pub(super) enum Flaw {
     Overlap,
     /// A cell began after the last one ended, or none did, but the mesh goes on there.
     Gap,
-    /// The ray enters the mesh not as often as it leaves.
+    /// The ray enters the mesh not as often as it leaves, or a cell was drawn where it is outside.
     Boundary,
-    /// Light comes through a cell so dense that f32 does not tell how much.
-    Dense,
+    /// Light comes through a cell so dense that f32 does not tell how much, or the largest value is of a cell whose values
+    /// f32 does not tell.
+    Coarse,
 }
 
 /// The pixels of a tile, block by block.
@@ -212,7 +213,7 @@ impl<const N: usize> Canvas<N> {
                     }
                     let t = t * lit[0];
                     t.store_slice(&mut self.light[3][lanes.clone()]);
-                    if r.dense {
+                    if r.coarse {
                         self.doubt((inside & t.simd_gt(of(DARK))).to_bitmask(), at);
                     }
                     if t.simd_lt(of(least)).to_bitmask() == 0xff {
@@ -233,7 +234,7 @@ impl<const N: usize> Canvas<N> {
                         };
                         self.gather(scene.blend, integral, at + l, &value(first[l]), &value(second[l]), length[l]);
                     }
-                    if r.dense {
+                    if r.coarse {
                         let lit = f32x8::from_slice(simd, &self.light[3][lanes.clone()]).simd_gt(of(DARK));
                         self.doubt((inside & lit).to_bitmask(), at);
                     }
@@ -248,7 +249,7 @@ impl<const N: usize> Canvas<N> {
     fn doubt(&mut self, lanes: u64, at: usize) {
         for l in (0..8).filter(|l| lanes >> l & 1 == 1) {
             if self.flaws[at + l] == Flaw::None {
-                self.flaws[at + l] = Flaw::Dense;
+                self.flaws[at + l] = Flaw::Coarse;
             }
         }
     }
@@ -323,6 +324,9 @@ impl<const N: usize> Canvas<N> {
                 };
                 let length = ((leave - enter) * f64::from(self.stretch[at])) as f32;
                 self.gather(scene.blend, integral, at, &value(enter), &value(leave), length);
+                if r.coarse && scene.blend == Blend::Maximum {
+                    self.doubt(1, at);
+                }
                 self.rest(at / 8, least, scene.blend);
             }
         }
@@ -340,12 +344,18 @@ impl<const N: usize> Canvas<N> {
             self.flaws[at] = Flaw::Overlap;
             return;
         }
+        // A gap begins where the ray leaves the mesh, and ends where it enters.
+        let held = |key: f32| {
+            let slack = SLACK * (1.0 + key.abs());
+            crossings.holds(at, f64::from(key), 2.0 * f64::from(slack))
+        };
+        let held = held(to) && (from == f32::NEG_INFINITY || held(from));
         // Nothing is drawn that is nearer to the eye.
         let from = f64::from(from).max(self.nearest);
         self.flaws[at] = match crossings.between(at, from, f64::from(to), self.eye_inside) {
-            None => Flaw::Boundary,
-            Some(missed) if missed <= 2.0 * f64::from(slack) => Flaw::None,
-            Some(_) => Flaw::Gap,
+            Some(missed) if missed > 2.0 * f64::from(slack) => Flaw::Gap,
+            Some(_) if held => Flaw::None,
+            _ => Flaw::Boundary,
         };
     }
 
@@ -368,6 +378,11 @@ impl<const N: usize> Canvas<N> {
                 let (last, end) = (self.last[at], crossings.last(at));
                 if !ended && end > last + SLACK * (1.0 + end.abs()) {
                     self.check_gap(crossings, at, last, end);
+                }
+                // Not compared with an end at −∞: that is where no ray meets the mesh.
+                let beyond = last > if crossings.any(at) { end + SLACK * (1.0 + end.abs()) } else { end };
+                if beyond && self.flaws[at] == Flaw::None {
+                    self.flaws[at] = Flaw::Boundary;
                 }
                 let light = match scene.blend {
                     Blend::Composite => {

@@ -27,15 +27,15 @@ pub(super) fn piece<S: Simd>(simd: S, x: f32x8<S>, y: f32x8<S>, direct: bool) ->
     if deep == 0 { all } else { deeper(simd, x, y, direct, deep, all) }
 }
 
-/// Up to a depth of 1/8: [`mild`] with fewer terms; what is left out is below 1e-6 of the opacity.
+/// Up to a depth of 1/8: [`mild`] with fewer terms; what is left out is below 1e-7 of the opacity.
 #[inline(always)]
 fn faint<S: Simd>(simd: S, x: f32x8<S>, y: f32x8<S>) -> [f32x8<S>; 3] {
     let of = |v: f32| f32x8::splat(simd, v);
     let (depth, rise) = ((x + y) * 0.5, y - x);
     let (square, h) = (depth * depth, depth * 0.5);
     let q = h * (of(1.0) - h * (of(0.5) - h * (of(1.0 / 6.0) - h * (1.0 / 24.0))));
-    let even = square * (1.0 / 24.0);
-    let bent = (square * (1.0 / 480.0) + 1.0 / 12.0) + rise * (1.0 / 240.0);
+    let even = square * (square * (1.0 / 1920.0) + 1.0 / 24.0);
+    let bent = (square * (1.0 / 480.0) + 1.0 / 12.0) + rise * (rise * (1.0 / 6720.0) + 1.0 / 240.0);
     let e = of(1.0) - q;
     let alpha = e * depth * (even + 1.0);
     let back = e * (q + even + rise * bent);

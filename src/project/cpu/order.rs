@@ -160,6 +160,15 @@ impl Crossings {
         Some(length)
     }
 
+    /// Whether a pixel's ray is inside the mesh at this key, or crosses the boundary as near to it as `slack`.
+    pub(super) fn holds(&self, pixel: usize, key: f64, slack: f64) -> bool {
+        let all = self.of(pixel);
+        let step = |c: &Crossing| if c.enters { 1 } else { -1 };
+        let before: i32 = all.iter().filter(|c| c.key < key).map(step).sum();
+        let sum: i32 = all.iter().map(step).sum();
+        before > sum.min(0) || all.iter().any(|c| (c.key - key).abs() <= slack)
+    }
+
     /// Calls `pair` with each two cells through which some ray leaves the mesh and then enters it again.
     fn for_each_gap(&self, mut pair: impl FnMut(u32, u32)) {
         let mut last = (u32::MAX, u32::MAX);

@@ -32,6 +32,9 @@ const EDGE_ON: f64 = 1e-10;
 /// Optical depth over a cell's extent in depth from which on rounding of lengths shows in pixels that light comes through.
 const DENSE: f64 = 30.0;
 
+/// Size of normalised values from which on rounding of others in the same cell shows where one value makes the pixel.
+const WIDE: f32 = 4.0;
+
 /// A cell of one tile.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Record<const N: usize> {
@@ -55,8 +58,8 @@ pub(super) struct Record<const N: usize> {
     /// A bit for each corner whose opposite face is turned away for sure: the cell beyond it comes later.
     pub(super) away: u8,
     pub(super) look: Look,
-    /// f32's lengths are too coarse for its extinction, where that lets light through.
-    pub(super) dense: bool,
+    /// f32's lengths are too coarse for its extinction, where that lets light through, or f32's values for the largest.
+    pub(super) coarse: bool,
     /// First and last interval of the transfer function (scalar fields).
     pub(super) lines: [u16; 2],
     /// Index into the mesh.
@@ -290,9 +293,13 @@ pub(super) fn set_up<S: Simd, const N: usize>(
             fronts: front.count_ones() as u8,
             away: away as u8,
             look,
-            dense: scene.blend == Blend::Composite
-                && f64::from(scene.steepest) * extents[l] > DENSE
-                && f64::from(scene.exact.opacity.densest(lines)) * extents[l] > DENSE,
+            coarse: match scene.blend {
+                Blend::Composite => {
+                    f64::from(scene.steepest) * extents[l] > DENSE
+                        && f64::from(scene.exact.opacity.densest(lines)) * extents[l] > DENSE
+                }
+                Blend::Maximum => span.iter().any(|s| s[0] < s[1] && (s[0] < -WIDE || s[1] > WIDE)),
+            },
             lines,
             cell,
         });
