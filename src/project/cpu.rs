@@ -211,13 +211,11 @@ impl Sweep {
         if place.len() != scene.geometry.cells.len() {
             place = fresh();
         }
-        let fault = || {
-            #[cfg(test)]
-            return self.fault;
-            #[cfg(not(test))]
-            ()
-        };
-        draw(self.level, worker, frame, scene, corner, &mut place, fault());
+        #[cfg(test)]
+        let fault = self.fault;
+        #[cfg(not(test))]
+        let fault = None;
+        draw(self.level, worker, frame, scene, corner, &mut place, fault);
         if let Ok(mut spare) = self.spare.lock() {
             spare.push(place);
         }
@@ -237,7 +235,7 @@ impl Sweep {
 }
 
 #[cfg(not(test))]
-type Fault = ();
+type Fault = Option<std::convert::Infallible>;
 #[cfg(test)]
 type Fault = Option<tests::Fault>;
 

@@ -63,7 +63,7 @@ impl Lens {
             return None;
         }
         lens.reference = if meet { near.max(0.5 * far) } else { near };
-        let cut = (fan.near > near && fan.near > 0.0) || (!meet && fan.near > near) || fan.far < far;
+        let cut = (fan.near > near && (fan.near > 0.0 || !meet)) || fan.far < far;
         lens.limited = cut || !view.clipping_planes().is_empty() || view.has_depth();
         Some(lens)
     }
@@ -183,7 +183,7 @@ pub(super) fn bounds<const K: usize>(
     let end = lens.size.map(|n| (n - 1) as f32);
     let (l, r) = (first(low[0]).max(0.0), last(high[0]).min(end[0]));
     let (t, b) = (first(low[1]).max(0.0), last(high[1]).min(end[1]));
-    (l <= r && t <= b).then(|| [l as u32, r as u32, t as u32, b as u32])
+    (l <= r && t <= b).then_some([l as u32, r as u32, t as u32, b as u32])
 }
 
 /// Least and greatest places of what of a cell or face lies before the eye; none if nothing does.

@@ -303,7 +303,8 @@ impl<const N: usize> Canvas<N> {
                 let Some([mut enter, mut leave]) = cell.depths(column + ASIDE.x, row + ASIDE.y) else { continue };
                 let key = |w: f64| lens.key(w) as f32;
                 let (key_in, key_out) = (key(enter), key(leave));
-                if !((key_in - self.last[at]).abs() <= SLACK * (1.0 + key_in.abs())) {
+                let apart = (key_in - self.last[at]).abs();
+                if apart.is_nan() || apart > SLACK * (1.0 + key_in.abs()) {
                     self.check_gap(crossings, at, self.last[at], key_in);
                 }
                 self.last[at] = key_out;

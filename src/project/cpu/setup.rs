@@ -138,7 +138,7 @@ impl<const N: usize> Scene<'_, N> {
         let opacity = &self.exact.opacity;
         let direct = self.exact.direct;
         // The colours of direct emission are elsewhere for other fields.
-        if !(direct && N > 1) && !opacity.shows(low, high, direct) {
+        if !(direct && N > 1 || opacity.shows(low, high, direct)) {
             return (Look::Unseen, [0; 2]);
         }
         (Look::Seen, opacity.intervals(low, high).map(|i| i as u16))
