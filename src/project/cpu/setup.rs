@@ -35,6 +35,10 @@ const DENSE: f64 = 30.0;
 /// Size of normalised values from which on rounding of others in the same cell shows where one value makes the pixel.
 const WIDE: f32 = 4.0;
 
+/// How far apart the values of a cell may be, where all of the field may span 2: beside an outlier, f32 places within the cell
+/// are too coarse for a function over the rest of the values.
+const STEEP: f32 = 0.25;
+
 /// A cell of one tile.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Record<const N: usize> {
@@ -298,7 +302,9 @@ pub(super) fn set_up<S: Simd, const N: usize>(
                     f64::from(scene.steepest) * extents[l] > DENSE
                         && f64::from(scene.exact.opacity.densest(lines)) * extents[l] > DENSE
                 }
-                Blend::Maximum => span.iter().any(|s| s[0] < s[1] && (s[0] < -WIDE || s[1] > WIDE)),
+                Blend::Maximum => {
+                    span.iter().any(|s| s[0] < s[1] && (s[0] < -WIDE || s[1] > WIDE || s[1] - s[0] > STEEP))
+                }
             },
             lines,
             cell,
