@@ -46,7 +46,7 @@ SCENES = [
     ("wavelet 10 M, 1024²", meshes.box, 126, TRANSPARENT, 1024, 2, False),
 ]
 PEERS = {"VTK projected": "projected", "VTK Bunyk": "bunyk"}
-ENGINES = {"Halite": "auto", "Halite walk": "traverse"}
+ENGINES = {"Halite projection": "project", "Halite walk": "traverse"}
 
 
 def scene_of(mesh, opacity, size, at_cells, path):
