@@ -33,7 +33,7 @@ use tables::{Key, Tables};
 /// How frames are drawn.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Engine {
-    /// The one that suits most: today always [`Engine::Traverse`].
+    /// [`Engine::Traverse`] on a graphics device, [`Engine::Project`] on the CPU.
     #[default]
     Auto,
     /// Rays walk from cell to cell; exact for every mesh. See [`crate::traverse`].
@@ -192,7 +192,7 @@ impl Renderer {
         // Whether tables are built on the device depends on it.
         self.key = None;
         let flat = self.mesh.as_ref().is_some_and(|m| m.flat);
-        self.stats.engine = if flat { Backend::without_device().engine() } else { self.backend.engine() }.into();
+        self.stats.engine = if flat { Backend::without_device(self.engine).engine() } else { self.backend.engine() }.into();
         if flat && self.backend.gpu().is_some() && self.stats.device != "cpu" {
             tracing::warn!("the mesh is too flat for the 32-bit floats of a device; the CPU draws it, by the walk");
         }
@@ -379,7 +379,7 @@ impl Renderer {
                 tracing::warn!("{why}; opening it again");
                 match Backend::open(self.engine, &self.choice) {
                     Ok(backend) => self.backend = backend,
-                    Err(_) if self.backend.may_fall_back() => self.backend = Backend::without_device(),
+                    Err(_) if self.backend.may_fall_back() => self.backend = Backend::without_device(self.engine),
                     Err(e) => return Err(e),
                 }
                 self.name_device();
@@ -403,7 +403,7 @@ impl Renderer {
 
     pub(crate) fn draw_on_cpu(&mut self, why: &Error) {
         tracing::warn!("{why}; now drawing on the CPU");
-        self.backend = Backend::without_device();
+        self.backend = Backend::without_device(self.engine);
         self.name_device();
     }
 
@@ -487,7 +487,7 @@ impl Renderer {
         let switches = &self.switches;
         let frame = Frame { mesh, field, transfer, exact, table, view, switches, progress };
         let uploaded = self.backend.gpu().map_or(0, Gpu::uploaded);
-        let mut walk = Backend::without_device();
+        let mut walk = Backend::without_device(self.engine);
         let backend = if mesh.flat { &mut walk } else { &mut self.backend };
         let drawn = self.pool.install(|| match &field.values {
             AnyValues::Scalar(v) => backend.draw(&frame, v),

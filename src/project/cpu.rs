@@ -2,23 +2,25 @@
 //! neighbouring pixels in vector lanes. Nothing is gathered: a cell's numbers are the same for all of its pixels.
 //!
 //! The stages: [`coarse`] projects points and deals cells to tiles, [`setup`] makes records of a tile's cells, [`order`] finds their
-//! sequence, [`fine`] draws them. Each pixel checks that what it composites is the mesh along its ray, piece after piece; those where
+//! sequence, [`fine`] finds and checks their pixels, [`measure`] integrates. Each pixel checks that what it composites is the mesh along its ray, piece after piece; those where
 //! it is not are drawn again by the walk. So the picture is the walk's where the order fails.
 
 mod coarse;
 mod fine;
 mod flat;
 mod lanes;
+mod measure;
 mod order;
 mod setup;
 #[cfg(test)]
 pub(crate) mod tests;
 
 use crate::geometry::{Geometry, Values};
+use crate::gpu::Part;
 use crate::integral::Integral;
 use crate::traverse::cpu;
-use crate::view::View;
-use coarse::{Dealt, Lens, TILE};
+use crate::view::{Blend, View};
+use coarse::{Dealt, Lens, PixelBox, TILE};
 use fearless_simd::{Level, Simd};
 use fine::{Canvas, Flaw};
 use order::{Crossings, Order};
@@ -39,6 +41,10 @@ const MOST_REDRAWN: f64 = 0.25;
 pub(crate) struct Sweep {
     level: Level,
     places: Vec<[f32; 2]>,
+    /// The pixels of cells, and of boundary faces.
+    boxes: [Vec<PixelBox>; 2],
+    /// The lines of the function that the values of cells are on; none while they are not known.
+    lines: Vec<[u16; 2]>,
     /// Memory of threads: zeros, one for each cell.
     spare: Mutex<Vec<Vec<u32>>>,
     /// Tests have this done to the order of cells.
@@ -77,6 +83,7 @@ pub(crate) struct Frame<'a, const N: usize> {
 struct Worker<const N: usize> {
     records: Vec<Record<N>>,
     cells: Vec<u32>,
+    faces: Vec<u32>,
     crossings: Crossings,
     order: Order,
     canvas: Canvas<N>,
@@ -102,9 +109,18 @@ impl Sweep {
         Sweep {
             level: Level::new(),
             places: vec![],
+            boxes: [vec![], vec![]],
+            lines: vec![],
             spare: Mutex::default(),
             #[cfg(test)]
             fault: None,
+        }
+    }
+
+    /// Takes `part` for changed.
+    pub(crate) fn forget(&mut self, part: Part) {
+        if part != Part::Points {
+            self.lines.clear();
         }
     }
 
@@ -118,20 +134,38 @@ impl Sweep {
         let Some(lens) = Lens::new(frame.geometry, frame.view) else { return (pixels, Counts::default()) };
         let Frame { geometry, values, .. } = *frame;
         coarse::project(&lens, &geometry.points, &mut self.places);
-        let places = &self.places;
-        let bounds = |i: usize| coarse::bounds(&lens, &geometry.points, places, geometry.cells[i].corners);
-        let cells = Dealt::new(&lens, geometry.cells.len(), bounds);
-        let bounds = |i: usize| coarse::bounds(&lens, &geometry.points, places, geometry.boundary.faces[i].points);
-        let faces = Dealt::new(&lens, geometry.boundary.faces.len(), bounds);
+        let (points, places, [of_cells, of_faces]) = (&geometry.points, &self.places, &mut self.boxes);
+        coarse::all_bounds(&lens, points, places, geometry.cells.len(), |i| geometry.cells[i].corners, of_cells);
+        let all = &geometry.boundary.faces;
+        coarse::all_bounds(&lens, points, places, all.len(), |i| all[i].points, of_faces);
+        let (cells, faces) = (Dealt::new(&lens, of_cells), Dealt::new(&lens, of_faces));
         let (exact, blend) = (frame.integral.exact, frame.view.blend());
         let steepest = exact.opacity.steepest();
-        let scene = Scene { geometry, values, exact, steepest, blend, lens: &lens, places };
+        let color = |k: usize| [&exact.opacity.value, &exact.opacity.slope].map(|v| [v[k][1], v[k][2], v[k][3], 0.0]);
+        let colors: Vec<_> = (0..exact.opacity.len()).map(color).collect();
+        let mut scene = Scene {
+            geometry,
+            values,
+            exact,
+            colors: &colors,
+            steepest,
+            blend,
+            lines: &[],
+            lens: &lens,
+            boxes: &self.boxes[0],
+            face_boxes: &self.boxes[1],
+        };
+        if blend == Blend::Composite && self.lines.len() != geometry.cells.len() {
+            scene.all_lines(&mut self.lines);
+        }
+        scene.lines = &self.lines;
 
         let mut targets = targets(&mut pixels, &lens);
         let (done, tiles, stopped) = (AtomicUsize::new(0), targets.len(), AtomicBool::new(false));
         let new = || Worker {
             records: vec![],
             cells: vec![],
+            faces: vec![],
             crossings: Crossings::default(),
             order: Order::default(),
             canvas: Canvas::new(),
@@ -195,17 +229,10 @@ impl Sweep {
         }
         let columns = scene.lens.tiles()[0];
         let corner = [(t % columns) as u32 * TILE, (t / columns) as u32 * TILE];
-        worker.crossings.clear();
-        for f in faces.of(t) {
-            let face = &scene.geometry.boundary.faces[f as usize];
-            if let Some(b) = coarse::bounds(scene.lens, &scene.geometry.points, scene.places, face.points) {
-                worker.crossings.add(scene.geometry, scene.lens, face, b, corner);
-            }
-        }
-        worker.crossings.sort();
         worker.cells.clear();
         worker.cells.extend(cells.of(t));
-        worker.canvas.clear(scene, frame.view, &worker.crossings, corner);
+        worker.faces.clear();
+        worker.faces.extend(faces.of(t));
         let fresh = || vec![0; scene.geometry.cells.len()];
         let mut place = self.spare.lock().ok().and_then(|mut s| s.pop()).unwrap_or_else(fresh);
         if place.len() != scene.geometry.cells.len() {
@@ -289,12 +316,17 @@ fn sweep<S: Simd, const N: usize>(
     place: &mut [u32],
     #[allow(unused_variables, reason = "tests alone inject faults")] fault: Fault,
 ) {
-    let Worker { records, cells, crossings, order, canvas } = worker;
-    records.clear();
-    for four in cells.chunks(4) {
-        setup::set_up(simd, scene, four, corner, records);
+    let Worker { records, cells, faces, crossings, order, canvas } = worker;
+    crossings.clear();
+    for &f in faces.iter() {
+        let f = f as usize;
+        crossings.add(simd, scene.geometry, scene.lens, &scene.geometry.boundary.faces[f], scene.face_boxes[f], corner);
     }
-    order.find(scene.geometry, records, crossings, place);
+    crossings.sort();
+    canvas.clear(scene, frame.view, crossings, corner);
+    records.clear();
+    setup::set_up(simd, scene, cells, corner, records);
+    order.find(scene.geometry, records, cells, crossings, place);
     #[cfg(test)]
     if let Some(fault) = fault {
         let mut sequence = vec![];
@@ -303,7 +335,7 @@ fn sweep<S: Simd, const N: usize>(
         }
         fault.inject(&mut sequence);
         sequence.iter().for_each(|&i| canvas.draw(simd, scene, &frame.integral, crossings, &records[i]));
-        return;
+        return canvas.flush(simd, scene, frame.integral.exact.direct);
     }
     while let Some(i) = order.next() {
         if canvas.is_done() {
@@ -311,6 +343,7 @@ fn sweep<S: Simd, const N: usize>(
         }
         canvas.draw(simd, scene, &frame.integral, crossings, &records[i]);
     }
+    canvas.flush(simd, scene, frame.integral.exact.direct);
 }
 
 /// Has the walk draw all of a frame.

@@ -51,7 +51,7 @@ impl Backend {
     /// is none.
     pub(super) fn open(engine: Engine, choice: &DeviceChoice) -> Result<Self> {
         if engine == Engine::Project && *choice == DeviceChoice::Cpu {
-            return Ok(Backend::Project(Box::new(Sweep::new())));
+            return Ok(Self::without_device(engine));
         }
         if engine == Engine::Project {
             return Ok(Backend::ProjectOnDevice(Box::new(Project::open(choice)?)));
@@ -63,7 +63,10 @@ impl Backend {
             }
             opened => opened?,
         };
-        Ok(device.map_or(Backend::Walk, |gpu| Backend::WalkOnDevice(Box::new(Traverse::new(gpu)))))
+        Ok(match device {
+            Some(gpu) => Backend::WalkOnDevice(Box::new(Traverse::new(gpu))),
+            None => Self::without_device(engine),
+        })
     }
 
     #[cfg(test)]
@@ -81,9 +84,12 @@ impl Backend {
         if let Backend::Project(sweep) = self { Some(sweep) } else { None }
     }
 
-    /// What draws where no device does any more.
-    pub(super) fn without_device() -> Self {
-        Backend::Walk
+    /// What draws where no device does.
+    pub(super) fn without_device(engine: Engine) -> Self {
+        match engine {
+            Engine::Traverse => Backend::Walk,
+            Engine::Auto | Engine::Project => Backend::Project(Box::new(Sweep::new())),
+        }
     }
 
     /// The name of the engine, as [`super::Stats`] has it.
@@ -116,7 +122,8 @@ impl Backend {
     /// Takes `part` for changed.
     pub(super) fn forget(&mut self, part: Part) {
         match self {
-            Backend::Walk | Backend::Project(_) => {}
+            Backend::Walk => {}
+            Backend::Project(sweep) => sweep.forget(part),
             Backend::WalkOnDevice(traverse) => traverse.forget(part),
             Backend::ProjectOnDevice(project) => project.forget(part),
         }

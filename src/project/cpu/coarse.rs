@@ -68,6 +68,11 @@ impl Lens {
         Some(lens)
     }
 
+    /// What h counts from.
+    pub(super) fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
     /// h of a point.
     #[inline(always)]
     pub(super) fn place(&self, p: DVec3) -> DVec3 {
@@ -114,10 +119,20 @@ impl Lens {
         }
     }
 
-    /// The length of a ray for each unit of depth.
-    pub(super) fn stretch(&self, column: f64, row: f64) -> f64 {
+    /// The length of the ray at a column and row for each unit of depth.
+    pub(super) fn length(&self, column: f64, row: f64) -> f64 {
+        self.stretch(column, row)[0].sqrt()
+    }
+
+    /// The square of that length at columns and rows (x, y) from there: of 1, x, y, x², y², x y.
+    pub(super) fn stretch(&self, column: f64, row: f64) -> [f64; 6] {
         let [middle, across, down] = self.direction;
-        if self.meet { (middle + across * column + down * row).length() } else { middle.length() }
+        if !self.meet {
+            return [middle.length_squared(), 0.0, 0.0, 0.0, 0.0, 0.0];
+        }
+        let d = middle + across * column + down * row;
+        let [x, y] = [across, down].map(|a| 2.0 * d.dot(a));
+        [d.length_squared(), x, y, across.length_squared(), down.length_squared(), 2.0 * across.dot(down)]
     }
 
     /// The keys between which pixel (`i`, `j`) is drawn.
@@ -142,8 +157,11 @@ impl Lens {
     }
 }
 
-/// First and last column, first and last row of pixels.
-pub(super) type Bounds = [u32; 4];
+/// First and last column, first and last row of pixels; the first is beyond the last if there are none.
+pub(super) type PixelBox = [u16; 4];
+
+/// No pixels.
+pub(super) const NONE: PixelBox = [1, 0, 1, 0];
 
 /// The points of the mesh on the image, in columns and rows; NaN where they are not before the eye.
 pub(super) fn project(lens: &Lens, points: &[DVec3], places: &mut Vec<[f32; 2]>) {
@@ -165,25 +183,51 @@ pub(super) fn bounds<const K: usize>(
     points: &[DVec3],
     places: &[[f32; 2]],
     corners: [u32; K],
-) -> Option<Bounds> {
+) -> PixelBox {
     let at = corners.map(|p| places[p as usize]);
     let (mut low, mut high) = (at[0], at[0]);
     for p in &at[1..] {
         for k in 0..2 {
-            low[k] = low[k].min(p[k]);
-            high[k] = high[k].max(p[k]);
+            low[k] = if p[k] < low[k] { p[k] } else { low[k] };
+            high[k] = if p[k] > high[k] { p[k] } else { high[k] };
         }
     }
-    if at.iter().any(|p| p[0].is_nan()) {
-        [low, high] = clipped(lens, &corners.map(|p| points[p as usize]))?;
+    let sum: f32 = at.iter().map(|p| p[0]).sum();
+    if sum.is_nan() {
+        match clipped(lens, &corners.map(|p| points[p as usize])) {
+            Some(outline) => [low, high] = outline,
+            None => return NONE,
+        }
     }
-    // Single floats round places far aside to thousandths of a pixel.
-    let first = |v: f32| (v - 0.01 - v.abs() * 1e-6).ceil();
-    let last = |v: f32| (v + 0.01 + v.abs() * 1e-6).floor();
-    let end = lens.size.map(|n| (n - 1) as f32);
-    let (l, r) = (first(low[0]).max(0.0), last(high[0]).min(end[0]));
-    let (t, b) = (first(low[1]).max(0.0), last(high[1]).min(end[1]));
-    (l <= r && t <= b).then_some([l as u32, r as u32, t as u32, b as u32])
+    let mut pixels = NONE;
+    for k in 0..2 {
+        let end = (lens.size[k] - 1) as f32;
+        // Single floats round places far aside to thousandths of a pixel.
+        let first = (low[k] - 0.01 - low[k].abs() * 1e-6).max(0.0);
+        let last = (high[k] + 0.01 + high[k].abs() * 1e-6).min(end);
+        // Both are 0 at least, so the integer part is the floor.
+        let (first, last) = (first.min(65535.0), last.max(-1.0) + 1.0);
+        let whole = first as u32;
+        let first = whole + u32::from((whole as f32) < first);
+        if first >= last as u32 {
+            return NONE;
+        }
+        pixels[2 * k] = first as u16;
+        pixels[2 * k + 1] = (last as u32 - 1) as u16;
+    }
+    pixels
+}
+
+/// [`bounds`] of `n` cells or faces.
+pub(super) fn all_bounds<const K: usize>(
+    lens: &Lens,
+    points: &[DVec3],
+    places: &[[f32; 2]],
+    n: usize,
+    corners: impl Fn(usize) -> [u32; K] + Sync,
+    boxes: &mut Vec<PixelBox>,
+) {
+    (0..n).into_par_iter().with_min_len(4096).map(|i| bounds(lens, points, places, corners(i))).collect_into_vec(boxes);
 }
 
 /// Least and greatest places of what of a cell or face lies before the eye; none if nothing does.
@@ -226,11 +270,12 @@ struct Part {
 }
 
 impl Dealt {
-    /// Deals items 0 to `n` to the tiles that their bounds meet.
-    pub(super) fn new(lens: &Lens, n: usize, bounds: impl Fn(usize) -> Option<Bounds> + Sync) -> Self {
+    /// Deals items to the tiles that their boxes meet.
+    pub(super) fn new(lens: &Lens, boxes: &[PixelBox]) -> Self {
         let [columns, tiles] = lens.tiles();
+        let n = boxes.len();
         let parts =
-            (0..PARTS).into_par_iter().map(|k| deal(columns, tiles, n * k / PARTS..n * (k + 1) / PARTS, &bounds));
+            (0..PARTS).into_par_iter().map(|k| deal(columns, tiles, n * k / PARTS..n * (k + 1) / PARTS, boxes));
         Dealt { parts: parts.collect() }
     }
 
@@ -246,32 +291,25 @@ impl Dealt {
     }
 }
 
-fn deal(columns: usize, tiles: usize, range: Range<usize>, bounds: &(impl Fn(usize) -> Option<Bounds> + Sync)) -> Part {
+fn deal(columns: usize, tiles: usize, range: Range<usize>, boxes: &[PixelBox]) -> Part {
     let mut start = vec![0_u32; tiles + 1];
-    // Tiles of each item that is seen: first and last column and row.
-    let mut seen = Vec::with_capacity(range.len());
-    for i in range {
-        let Some(b) = bounds(i) else { continue };
-        let [l, r, t, b] = b.map(|v| (v / TILE) as u16);
-        seen.push((i as u32, [l, r, t, b]));
-        for y in t..=b {
-            for x in l..=r {
-                start[y as usize * columns + x as usize + 1] += 1;
-            }
-        }
+    let tiles_of = |b: &PixelBox| {
+        let [l, r, t, b] = b.map(|v| usize::from(v) / TILE as usize);
+        (t..=b).flat_map(move |y| (l..=r).map(move |x| y * columns + x))
+    };
+    let seen = |i: &usize| boxes[*i][0] <= boxes[*i][1];
+    for i in range.clone().filter(seen) {
+        tiles_of(&boxes[i]).for_each(|t| start[t + 1] += 1);
     }
     for t in 0..tiles {
         start[t + 1] += start[t];
     }
     let mut next = start.clone();
     let mut items = vec![0; start[tiles] as usize];
-    for (i, [l, r, t, b]) in seen {
-        for y in t..=b {
-            for x in l..=r {
-                let at = &mut next[y as usize * columns + x as usize];
-                items[*at as usize] = i;
-                *at += 1;
-            }
+    for i in range.filter(seen) {
+        for t in tiles_of(&boxes[i]) {
+            items[next[t] as usize] = i as u32;
+            next[t] += 1;
         }
     }
     Part { start, items }

@@ -30,41 +30,58 @@ pub(super) fn piece<S: Simd>(simd: S, x: f32x8<S>, y: f32x8<S>, direct: bool) ->
 /// Up to a depth of 1/8: [`mild`] with fewer terms; what is left out is below 1e-7 of the opacity.
 #[inline(always)]
 fn faint<S: Simd>(simd: S, x: f32x8<S>, y: f32x8<S>) -> [f32x8<S>; 3] {
-    let of = |v: f32| f32x8::splat(simd, v);
+    let one = f32x8::splat(simd, 1.0);
     let (depth, rise) = ((x + y) * 0.5, y - x);
     let (square, h) = (depth * depth, depth * 0.5);
-    let q = h * (of(1.0) - h * (of(0.5) - h * (of(1.0 / 6.0) - h * (1.0 / 24.0))));
-    let even = square * (square * (1.0 / 1920.0) + 1.0 / 24.0);
-    let bent = (square * (1.0 / 480.0) + 1.0 / 12.0) + rise * (rise * (1.0 / 6720.0) + 1.0 / 240.0);
-    let e = of(1.0) - q;
-    let alpha = e * depth * (even + 1.0);
-    let back = e * (q + even + rise * bent);
+    let q = h * series(simd, h, &[1.0, -0.5, 1.0 / 6.0, -1.0 / 24.0]);
+    let even = square * series(simd, square, &[1.0 / 24.0, 1.0 / 1920.0]);
+    let bent = rise.mul_add(
+        series(simd, rise, &[1.0 / 240.0, 1.0 / 6720.0]),
+        series(simd, square, &[1.0 / 12.0, 1.0 / 480.0]),
+    );
+    let e = one - q;
+    let scaled = e * depth;
+    let alpha = scaled.mul_add(even, scaled);
+    let back = e * rise.mul_add(bent, q + even);
     [alpha, alpha - back, back]
+}
+
+/// c₀ + c₁ x + c₂ x² + …
+#[inline(always)]
+fn series<S: Simd, const K: usize>(simd: S, x: f32x8<S>, c: &[f32; K]) -> f32x8<S> {
+    let mut sum = f32x8::splat(simd, c[K - 1]);
+    for k in (0..K - 1).rev() {
+        sum = x.mul_add(sum, f32x8::splat(simd, c[k]));
+    }
+    sum
 }
 
 /// Up to a depth of 1: `Piece::mild`.
 #[inline(always)]
 fn mild<S: Simd>(simd: S, x: f32x8<S>, y: f32x8<S>, direct: bool) -> [f32x8<S>; 3] {
-    let of = |v: f32| f32x8::splat(simd, v);
+    const Q: [f32; 8] =
+        [1.0, -1.0 / 2.0, 1.0 / 6.0, -1.0 / 24.0, 1.0 / 120.0, -1.0 / 720.0, 1.0 / 5040.0, -1.0 / 40_320.0];
+    let one = f32x8::splat(simd, 1.0);
     let (depth, rise) = ((x + y) * 0.5, y - x);
     let (square, h) = (depth * depth, depth * 0.5);
-    let mut q = h * (1.0 / 40_320.0);
-    for factorial in [5040.0_f32, 720.0, 120.0, 24.0, 6.0, 2.0, 1.0] {
-        q = h * (of(1.0 / factorial) - q);
-    }
-    let even = square * (square * (square * (1.0 / 322_560.0) + 1.0 / 1920.0) + 1.0 / 24.0);
-    let once = square * (square * (1.0 / 53_760.0) + 1.0 / 480.0) + 1.0 / 12.0;
-    let twice = square * (1.0 / 13_440.0) + 1.0 / 240.0;
-    let thrice = square * (1.0 / 483_840.0) + 1.0 / 6720.0 + rise * (1.0 / 241_920.0);
-    let bent = once + rise * (twice + rise * thrice);
-    let e = of(1.0) - q;
-    let alpha = e * depth * (even + 1.0);
+    let q = h * series(simd, h, &Q);
+    let even = square * series(simd, square, &[1.0 / 24.0, 1.0 / 1920.0, 1.0 / 322_560.0]);
+    let once = series(simd, square, &[1.0 / 12.0, 1.0 / 480.0, 1.0 / 53_760.0]);
+    let twice = series(simd, square, &[1.0 / 240.0, 1.0 / 13_440.0]);
+    let thrice = rise.mul_add(
+        f32x8::splat(simd, 1.0 / 241_920.0),
+        series(simd, square, &[1.0 / 6720.0, 1.0 / 483_840.0]),
+    );
+    let bent = rise.mul_add(rise.mul_add(thrice, twice), once);
+    let e = one - q;
+    let scaled = e * depth;
+    let alpha = scaled.mul_add(even, scaled);
     if direct {
         let seen = even + 1.0 + rise * bent;
         let back = e * (seen * 0.5 - depth * bent);
         return [alpha, e * seen - back, back];
     }
-    let back = e * (q + even + rise * bent);
+    let back = e * rise.mul_add(bent, q + even);
     [alpha, alpha - back, back]
 }
 

@@ -9,11 +9,13 @@
 //! depth is v = −w_R (n.x x + n.y y)/n.z. The ray (w_R x, w_R y, v) = β₁ e₁ + β₂ e₂ passes through it if β₁, β₂ and 1 − κ v − β₁ − β₂
 //! are none below 0.
 
-use super::coarse::{ASIDE, Bounds, Lens, TILE};
+use super::coarse::{ASIDE, Lens, PixelBox, TILE};
 use super::setup::{Look, Record};
 use crate::geometry::Geometry;
 use crate::geometry::boundary::BoundaryFace;
 use crate::mesh::faces::BOUNDARY;
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f64x4};
 
 const PIXELS: usize = (TILE * TILE) as usize;
 
@@ -44,12 +46,14 @@ impl Crossings {
     }
 
     /// Finds the pixels whose rays cross `face` of those in `bounds`, in the tile whose first pixel is (`left`, `top`).
-    pub(super) fn add(
+    #[inline(always)]
+    pub(super) fn add<S: Simd>(
         &mut self,
+        simd: S,
         geometry: &Geometry,
         lens: &Lens,
         face: &BoundaryFace,
-        b: Bounds,
+        b: PixelBox,
         [left, top]: [u32; 2],
     ) {
         let mut h = face.points.map(|p| lens.place(geometry.points[p as usize]));
@@ -78,15 +82,24 @@ impl Crossings {
         // Columns run right and rows down: a face that turns counter-clockwise seen from outside turns clockwise there when it
         // is turned to the eye.
         let enters = (area < 0.0) != lens.mirrored();
+        let b = b.map(u32::from);
         let (right, bottom) = (b[1].min(left + TILE - 1), b[3].min(top + TILE - 1));
+        let of = |v: f64| f64x4::splat(simd, v);
+        let ramp = f64x4::load_array(simd, [0.0, 1.0, 2.0, 3.0]) + (ASIDE.x - at.x);
+        let weights = [(0.0, one), (0.0, two), (1.0, zero)];
         for j in b[2].max(top)..=bottom {
             let y = f64::from(j) + ASIDE.y - at.y;
-            for i in b[0].max(left)..=right {
-                let x = f64::from(i) + ASIDE.x - at.x;
-                let plane = |p: [f64; 2]| p[0] * x + p[1] * y;
-                if plane(one) >= 0.0 && plane(two) >= 0.0 && 1.0 + plane(zero) >= 0.0 {
-                    let (pixel, key) = (place(i - left, j - top) as u16, base + ratio * plane(v));
-                    self.found.push(Crossing { pixel, enters, cell: face.cell, key });
+            let row = weights.map(|(c, p)| of(c + p[1] * y));
+            for i in (b[0].max(left)..=right).step_by(4) {
+                let x = ramp + f64::from(i);
+                let [one, two, zero] = [0, 1, 2].map(|k| x.mul_add(of(weights[k].1[0]), row[k]).simd_ge(of(0.0)));
+                let mut inside = (one & two & zero).to_bitmask() & ((2 << (right - i).min(3)) - 1);
+                while inside != 0 {
+                    let i = i + inside.trailing_zeros();
+                    inside &= inside - 1;
+                    let x = f64::from(i) + ASIDE.x - at.x;
+                    let key = base + ratio * (v[0] * x + v[1] * y);
+                    self.found.push(Crossing { pixel: place(i - left, j - top) as u16, enters, cell: face.cell, key });
                 }
             }
         }
@@ -190,14 +203,21 @@ pub(super) fn place(i: u32, j: u32) -> usize {
 /// The order of a tile's cells, being drawn.
 #[derive(Debug, Default)]
 pub(super) struct Order {
-    /// Cells behind the faces of each cell.
-    next: Vec<[u32; 4]>,
+    nodes: Vec<Node>,
     /// Pairs of cells that boundary faces order, by the first.
     gaps: Vec<(u32, u32)>,
-    before: Vec<u32>,
     free: Vec<u32>,
     search: usize,
     left: usize,
+}
+
+/// A cell in the order.
+#[derive(Debug, Clone, Copy)]
+struct Node {
+    /// Cells behind its faces.
+    next: [u32; 4],
+    /// Number of cells that come before it and have not been drawn.
+    before: u32,
 }
 
 /// Has been drawn.
@@ -209,24 +229,26 @@ impl Order {
         &mut self,
         geometry: &Geometry,
         records: &[Record<N>],
+        cells: &[u32],
         crossings: &Crossings,
         place: &mut [u32],
     ) {
-        for (i, r) in records.iter().enumerate() {
-            place[r.cell as usize] = i as u32 + 1;
+        for (i, &cell) in cells.iter().enumerate() {
+            place[cell as usize] = i as u32 + 1;
         }
-        self.before.clear();
-        self.before.resize(records.len(), 0);
-        self.next.clear();
-        self.next.resize(records.len(), [BOUNDARY; 4]);
-        for (i, r) in records.iter().enumerate() {
-            let around = geometry.cells[r.cell as usize].neighbours;
+        self.nodes.clear();
+        self.nodes.resize(records.len(), Node { next: [BOUNDARY; 4], before: 0 });
+        for (i, (r, &cell)) in records.iter().zip(cells).enumerate() {
+            if r.look == Look::Empty {
+                continue;
+            }
+            let around = geometry.cells[cell as usize].neighbours;
             for k in 0..4 {
-                if r.away >> k & 1 == 1 && around[k] != BOUNDARY && r.look != Look::Empty {
+                if r.away >> k & 1 == 1 && around[k] != BOUNDARY {
                     let behind = place[around[k] as usize];
                     if behind > 0 {
-                        self.next[i][k] = behind - 1;
-                        self.before[behind as usize - 1] += 1;
+                        self.nodes[i].next[k] = behind - 1;
+                        self.nodes[behind as usize - 1].before += 1;
                     }
                 }
             }
@@ -242,13 +264,13 @@ impl Order {
         self.gaps.sort_unstable();
         self.gaps.dedup();
         for &(_, b) in &self.gaps {
-            self.before[b as usize] += 1;
+            self.nodes[b as usize].before += 1;
         }
-        for r in records {
-            place[r.cell as usize] = 0;
+        for &cell in cells {
+            place[cell as usize] = 0;
         }
         self.free.clear();
-        self.free.extend((0..records.len() as u32).rev().filter(|&i| self.before[i as usize] == 0));
+        self.free.extend((0..records.len() as u32).rev().filter(|&i| self.nodes[i as usize].before == 0));
         (self.search, self.left) = (0, records.len());
     }
 
@@ -260,25 +282,41 @@ impl Order {
         let i = match self.free.pop() {
             Some(i) => i as usize,
             None => {
-                while matches!(self.before[self.search], 0 | DONE) {
+                while matches!(self.nodes[self.search].before, 0 | DONE) {
                     self.search += 1;
                 }
                 self.search
             }
         };
         self.left -= 1;
-        self.before[i] = DONE;
-        let from = self.gaps.partition_point(|g| (g.0 as usize) < i);
-        let gaps = self.gaps[from..].iter().take_while(|g| g.0 as usize == i).map(|g| g.1);
-        for n in self.next[i].into_iter().filter(|&n| n != BOUNDARY).chain(gaps) {
-            let before = &mut self.before[n as usize];
-            if *before != DONE && *before > 0 {
-                *before -= 1;
-                if *before == 0 {
-                    self.free.push(n);
+        self.nodes[i].before = DONE;
+        for n in self.nodes[i].next {
+            if n != BOUNDARY {
+                self.release(n);
+            }
+        }
+        if !self.gaps.is_empty() {
+            let from = self.gaps.partition_point(|g| (g.0 as usize) < i);
+            for g in from..self.gaps.len() {
+                let (before, after) = self.gaps[g];
+                if before as usize != i {
+                    break;
                 }
+                self.release(after);
             }
         }
         Some(i)
+    }
+
+    /// One of the cells before cell `n` has been drawn.
+    #[inline(always)]
+    fn release(&mut self, n: u32) {
+        let before = &mut self.nodes[n as usize].before;
+        if *before != DONE && *before > 0 {
+            *before -= 1;
+            if *before == 0 {
+                self.free.push(n);
+            }
+        }
     }
 }

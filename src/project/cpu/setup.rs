@@ -14,13 +14,14 @@
 //!
 //! Parallel views are the same with e_k = Δh, 1 for w_R, κ = 0, c = S.z and V = V_R + v.
 
-use super::coarse::{ASIDE, Lens, TILE};
+use super::coarse::{ASIDE, Lens, PixelBox, TILE};
 use crate::geometry::{Geometry, Values};
 use crate::integral::Exact;
 use crate::view::Blend;
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f64x4};
+use fearless_simd::{Simd, f32x4, f64x4, u8x16};
 use glam::DVec3;
+use rayon::prelude::*;
 
 /// A cell whose thickest place is less than this share of its extent in depth is intersected in f64: f32 could not tell its
 /// thickness.
@@ -39,8 +40,15 @@ const WIDE: f32 = 4.0;
 /// are too coarse for a function over the rest of the values.
 const STEEP: f32 = 0.25;
 
+/// The lines of a cell of which nothing is seen.
+pub(super) const UNSEEN: [u16; 2] = [1, 0];
+
+/// Cells that are read together, so that memory has many of them to find at a time.
+const TOGETHER: usize = 32;
+
 /// A cell of one tile.
 #[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
 pub(super) struct Record<const N: usize> {
     /// v = plane[0] + plane[1] x + plane[2] y of the four faces; those turned to the eye come first.
     pub(super) plane: [[f32; 4]; 3],
@@ -83,9 +91,9 @@ pub(super) enum Look {
     Empty,
 }
 
-/// Face indices by the mask of faces turned to the eye: these first.
-static FRONTS_FIRST: [[u8; 4]; 16] = {
-    let mut table = [[0; 4]; 16];
+/// Bytes of four floats by the mask of faces turned to the eye: those of these faces first.
+static FRONTS_FIRST: [[u8; 16]; 16] = {
+    let mut table = [[0; 16]; 16];
     let mut mask = 0;
     while mask < 16 {
         let (mut at, mut pass) = (0, 0);
@@ -93,7 +101,11 @@ static FRONTS_FIRST: [[u8; 4]; 16] = {
             let mut k = 0;
             while k < 4 {
                 if (mask >> k & 1 == 1) == (pass == 0) {
-                    table[mask][at] = k as u8;
+                    let mut byte = 0;
+                    while byte < 4 {
+                        table[mask][4 * at + byte] = (4 * k + byte) as u8;
+                        byte += 1;
+                    }
                     at += 1;
                 }
                 k += 1;
@@ -111,11 +123,17 @@ pub(super) struct Scene<'a, const N: usize> {
     pub(super) geometry: &'a Geometry,
     pub(super) values: &'a Values<N>,
     pub(super) exact: &'a Exact<f32>,
+    /// Red, green and blue of each line of the function at its lower knot, and their slopes.
+    pub(super) colors: &'a [[[f32; 4]; 2]],
     /// The greatest extinction of the function.
     pub(super) steepest: f32,
     pub(super) blend: Blend,
+    /// Those of all cells, for pictures that composite.
+    pub(super) lines: &'a [[u16; 2]],
     pub(super) lens: &'a Lens,
-    pub(super) places: &'a [[f32; 2]],
+    /// The pixels that cells, and boundary faces, may cover.
+    pub(super) boxes: &'a [PixelBox],
+    pub(super) face_boxes: &'a [PixelBox],
 }
 
 impl<const N: usize> Scene<'_, N> {
@@ -129,100 +147,215 @@ impl<const N: usize> Scene<'_, N> {
         }
     }
 
-    /// What of a cell with these values is seen, and on which lines of the function they are.
-    #[inline(always)]
-    fn look(&self, span: &[[f32; 2]; N], finite: bool) -> (Look, [u16; 2]) {
-        if !finite {
-            return (Look::Unseen, [0; 2]);
+    /// On which lines of the function the values of a cell are; [`UNSEEN`] if it is not seen.
+    fn lines(&self, cell: usize) -> [u16; 2] {
+        let v = self.corner_values(cell as u32, self.geometry.cells[cell].corners);
+        if !v.iter().flatten().all(|v| v.is_finite()) {
+            return UNSEEN;
         }
-        let [low, high] = span[N - 1];
-        if self.blend == Blend::Maximum {
-            return (Look::Seen, [0; 2]);
-        }
-        let opacity = &self.exact.opacity;
-        let direct = self.exact.direct;
+        let [low, high] = [f32::min, f32::max].map(|pick| v.iter().map(|v| v[N - 1]).reduce(pick).unwrap_or(0.0));
+        let (opacity, direct) = (&self.exact.opacity, self.exact.direct);
         // The colours of direct emission are elsewhere for other fields.
-        if !(direct && N > 1 || opacity.shows(low, high, direct)) {
-            return (Look::Unseen, [0; 2]);
+        if direct && N > 1 || opacity.shows(low, high, direct) {
+            opacity.intervals(low, high).map(|i| i as u16)
+        } else {
+            UNSEEN
         }
-        (Look::Seen, opacity.intervals(low, high).map(|i| i as u16))
+    }
+
+    /// Of each cell the lines of the function that its values are on, or [`UNSEEN`].
+    pub(super) fn all_lines(&self, lines: &mut Vec<[u16; 2]>) {
+        let cells = 0..self.geometry.cells.len();
+        cells.into_par_iter().with_min_len(4096).map(|i| self.lines(i)).collect_into_vec(lines);
     }
 }
 
-/// Appends the records of up to four cells that meet the tile whose first pixel is (`left`, `top`).
+type Triple<S> = [f64x4<S>; 3];
+
+/// The cross product. (Closures that are called more than once need not become part of their caller, where alone the vector
+/// instructions are known.)
+#[inline(always)]
+fn cross<S: Simd>(a: Triple<S>, b: Triple<S>) -> Triple<S> {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+/// Puts the first corner, relative to the lens's origin, and the edges from there into lane `l`.
+#[inline(always)]
+fn relative(lens: &Lens, p: &[DVec3; 4], l: usize, from: &mut [[f64; 4]; 3], edge: &mut [[[f64; 4]; 3]; 3]) {
+    let d = p[0] - lens.origin();
+    (from[0][l], from[1][l], from[2][l]) = (d.x, d.y, d.z);
+    for k in 0..3 {
+        let d = p[k + 1] - p[0];
+        (edge[k][0][l], edge[k][1][l], edge[k][2][l]) = (d.x, d.y, d.z);
+    }
+}
+
+/// `rows` times the vectors.
+#[inline(always)]
+fn turn<S: Simd>(simd: S, rows: &[DVec3; 3], d: &[[f64; 4]; 3]) -> Triple<S> {
+    let (x, y, z) = (
+        f64x4::load_array_ref(simd, &d[0]),
+        f64x4::load_array_ref(simd, &d[1]),
+        f64x4::load_array_ref(simd, &d[2]),
+    );
+    let [a, b, c] = rows;
+    [
+        x.mul_add(f64x4::splat(simd, a.x), y.mul_add(f64x4::splat(simd, a.y), z * a.z)),
+        x.mul_add(f64x4::splat(simd, b.x), y.mul_add(f64x4::splat(simd, b.y), z * b.z)),
+        x.mul_add(f64x4::splat(simd, c.x), y.mul_add(f64x4::splat(simd, c.y), z * c.z)),
+    ]
+}
+
+/// Never 0, of the sign of `v`.
+#[inline(always)]
+fn guard<S: Simd>(v: f64x4<S>, scale: f64x4<S>) -> f64x4<S> {
+    v.abs().max(scale * 1e-12 + 1e-280).copysign(v)
+}
+
+/// What two products may be off by.
+#[inline(always)]
+fn terms<S: Simd>(p: Triple<S>, r: Triple<S>) -> f64x4<S> {
+    (p[0] * r[1]).abs() + (p[1] * r[0]).abs()
+}
+
+/// Four single floats as doubles.
+#[inline(always)]
+fn wide<S: Simd>(simd: S, [a, b, c, d]: [f32; 4]) -> f64x4<S> {
+    f64x4::load_array(simd, [f64::from(a), f64::from(b), f64::from(c), f64::from(d)])
+}
+
+/// As four single floats.
+#[inline(always)]
+fn single<S: Simd>(simd: S, v: f64x4<S>) -> f32x4<S> {
+    let [a, b, c, d] = v.to_array();
+    f32x4::load_array(simd, [a as f32, b as f32, c as f32, d as f32])
+}
+
+/// Four numbers of four cells, cell by cell.
+#[inline(always)]
+fn by_cell<S: Simd>(simd: S, v: [f32x4<S>; 4]) -> [[f32; 4]; 4] {
+    let mut all = [0.0; 16];
+    simd.store_four_interleaved_f32x4(v, &mut all);
+    let (rows, _) = all.as_chunks::<4>();
+    [rows[0], rows[1], rows[2], rows[3]]
+}
+
+/// As [`by_cell`], of doubles.
+#[inline(always)]
+fn singles<S: Simd>(simd: S, v: [f64x4<S>; 4]) -> [[f32; 4]; 4] {
+    by_cell(simd, [single(simd, v[0]), single(simd, v[1]), single(simd, v[2]), single(simd, v[3])])
+}
+
+/// Appends the records of cells that meet the tile whose first pixel is `corner`.
 #[inline(always)]
 pub(super) fn set_up<S: Simd, const N: usize>(
     simd: S,
     scene: &Scene<N>,
     cells: &[u32],
+    corner: [u32; 2],
+    records: &mut Vec<Record<N>>,
+) {
+    let mut read = [Read { corners: [DVec3::ZERO; 4], values: [[0.0; N]; 4] }; TOGETHER];
+    for some in cells.chunks(TOGETHER) {
+        for (&cell, read) in some.iter().zip(&mut read) {
+            let corners = scene.geometry.cells[cell as usize].corners;
+            for k in 0..4 {
+                read.corners[k] = scene.geometry.points[corners[k] as usize];
+            }
+            read.values = scene.corner_values(cell, corners);
+        }
+        for (four, read) in some.chunks(4).zip(read.chunks_mut(4)) {
+            simd.vectorize(
+                #[inline(always)]
+                || set_up_four(simd, scene, four, read, corner, records),
+            );
+        }
+    }
+}
+
+/// What memory has of a cell.
+#[derive(Clone, Copy)]
+struct Read<const N: usize> {
+    corners: [DVec3; 4],
+    values: [[f32; N]; 4],
+}
+
+/// Appends the records of up to four cells.
+#[inline(always)]
+fn set_up_four<S: Simd, const N: usize>(
+    simd: S,
+    scene: &Scene<N>,
+    cells: &[u32],
+    read: &mut [Read<N>],
     [left, top]: [u32; 2],
     records: &mut Vec<Record<N>>,
 ) {
-    let Scene { geometry, lens, .. } = scene;
+    let lens = scene.lens;
     let zero = [0.0; 4];
+    // The first corner from the lens's origin, the others from it: x, y, z.
+    let mut from = [zero, zero, [1.0; 4]];
     let mut edge = [[zero; 3]; 3];
-    let (mut at, mut depth) = ([zero; 2], [1.0; 4]);
-    let mut values = [[[0.0_f32; N]; 4]; 4];
     let mut first = [0_usize; 4];
-    for (l, &cell) in cells.iter().enumerate() {
-        let corners = geometry.cells[cell as usize].corners;
-        let mut p = corners.map(|c| geometry.points[c as usize]);
-        values[l] = scene.corner_values(cell, corners);
-        let mut h = lens.place(p[0]);
-        if lens.meet {
-            // The deepest corner, if the first is near the eye.
-            let w = p.map(|q| lens.place(q).z);
-            let deepest = (1..4).fold(0, |m, k| if w[k] > w[m] { k } else { m });
-            if w[0] < 0.25 * w[deepest] {
-                first[l] = deepest;
-                p.swap(0, deepest);
-                values[l].swap(0, deepest);
-                h = lens.place(p[0]);
-            }
-        }
-        let place = lens.pixel(h) - ASIDE;
-        (at[0][l], at[1][l], depth[l]) = (place.x, place.y, h.z);
-        for k in 0..3 {
-            let d = p[k + 1] - p[0];
-            (edge[k][0][l], edge[k][1][l], edge[k][2][l]) = (d.x, d.y, d.z);
-        }
+    for l in 0..cells.len() {
+        relative(lens, &read[l].corners, l, &mut from, &mut edge);
     }
     let of = |v: f64| f64x4::splat(simd, v);
-    let load = |v: &[f64; 4]| f64x4::from_slice(simd, v);
-    let w_r = load(&depth);
-    let [m, q] = if lens.meet { [w_r, of(1.0)] } else { [of(1.0), of(0.0)] };
+    let (none, one) = (of(0.0), of(1.0));
     let rows = lens.rows();
-    let (ax, ay) = (load(&at[0]) + ASIDE.x, load(&at[1]) + ASIDE.y);
-    let e = edge.map(|d| {
-        let [x, y, z] = [load(&d[0]), load(&d[1]), load(&d[2])];
-        let [hx, hy, hz] = rows.map(|r: DVec3| x * r.x + y * r.y + z * r.z);
-        if lens.meet { [hx - ax * hz, hy - ay * hz, hz] } else { [hx, hy, hz] }
-    });
-    let cross = |a: [f64x4<S>; 3], b: [f64x4<S>; 3]| {
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    };
+    let mut h = turn(simd, &rows, &from);
+    let mut e = [turn(simd, &rows, &edge[0]), turn(simd, &rows, &edge[1]), turn(simd, &rows, &edge[2])];
+    if lens.meet {
+        let rise = e[0][2].max(e[1][2]).max(e[2][2]);
+        let near = rise.simd_gt(h[2] * 3.0).to_bitmask();
+        if near != 0 {
+            // The deepest corner, if the first is near the eye.
+            for l in (0..cells.len()).filter(|l| near >> l & 1 == 1) {
+                let rise = [0, 1, 2].map(|k| e[k][2].to_array()[l]);
+                first[l] = (1..4).fold(1, |m, k| if rise[k - 1] > rise[m - 1] { k } else { m });
+                read[l].corners.swap(0, first[l]);
+                read[l].values.swap(0, first[l]);
+                relative(lens, &read[l].corners, l, &mut from, &mut edge);
+            }
+            h = turn(simd, &rows, &from);
+            e = [turn(simd, &rows, &edge[0]), turn(simd, &rows, &edge[1]), turn(simd, &rows, &edge[2])];
+        }
+    }
+    let w = h[2];
+    let (over_w, mut place) = (one / w, [h[0], h[1]]);
+    let (m, q, kappa) = if lens.meet { (w, one, over_w) } else { (one, none, none) };
+    if lens.meet {
+        place = [place[0] * over_w, place[1] * over_w];
+        for [x, y, z] in &mut e {
+            (*x, *y) = (*x - place[0] * *z, *y - place[1] * *z);
+        }
+    }
     let mut a = [cross(e[1], e[2]), cross(e[2], e[0]), cross(e[0], e[1])];
     let det = e[0][0] * a[0][0] + e[0][1] * a[0][1] + e[0][2] * a[0][2];
-    let sign = of(1.0).copysign(det);
-    a = a.map(|a| a.map(|c| c * sign));
+    let sign = one.copysign(det);
+    for a in &mut a {
+        *a = [a[0] * sign, a[1] * sign, a[2] * sign];
+    }
     let det = det.abs();
-    let sum = [0, 1, 2].map(|k| a[0][k] + a[1][k] + a[2][k]);
+    let sum = |k: usize| a[0][k] + a[1][k] + a[2][k];
+    let sum = [sum(0), sum(1), sum(2)];
     let c = m * sum[2] + q * det;
-    // Never 0, of the same sign.
-    let guard = |v: f64x4<S>, scale: f64x4<S>| v.abs().max(scale * 1e-12 + 1e-280).copysign(v);
     let safe = guard(c, m * (sum[0].abs() + sum[1].abs()));
     let f = m / safe;
-    let mut planes = [[of(0.0); 4]; 3];
-    (planes[0][0], planes[1][0], planes[2][0]) = (f * det, -(f * m * sum[0]), -(f * m * sum[1]));
+    let mut planes = [[none; 4]; 3];
+    (planes[0][0], planes[1][0], planes[2][0]) = (f * det, none - f * m * sum[0], none - f * m * sum[1]);
     for i in 0..3 {
         // What is 0 counts as turned to the eye, here and for the mask below.
         a[i][2] = guard(a[i][2], a[i][0].abs() + a[i][1].abs());
         let f = m / a[i][2];
-        (planes[1][i + 1], planes[2][i + 1]) = (-(f * a[i][0]), -(f * a[i][1]));
+        (planes[1][i + 1], planes[2][i + 1]) = (none - f * a[i][0], none - f * a[i][1]);
     }
-    let terms = |p: [f64x4<S>; 3], r: [f64x4<S>; 3]| (p[0] * r[1]).abs() + (p[1] * r[0]).abs();
     let scale = [terms(e[1], e[2]), terms(e[2], e[0]), terms(e[0], e[1])];
-    let fronts = [of(0.0) - c, a[0][2], a[1][2], a[2][2]].map(|v| v.simd_gt(of(0.0)).to_bitmask());
+    let turned = |v: f64x4<S>| v.simd_gt(none).to_bitmask();
+    let fronts = [turned(none - c), turned(a[0][2]), turned(a[1][2]), turned(a[2][2])];
     let doubtful = |v: f64x4<S>, scale: f64x4<S>| v.abs().simd_le(scale * EDGE_ON).to_bitmask();
     let doubts = [
         doubtful(c, m * (scale[0] + scale[1] + scale[2])),
@@ -232,22 +365,56 @@ pub(super) fn set_up<S: Simd, const N: usize>(
     ];
     // The chord through the thickest place is at least D over the greatest area.
     let area = (sum[2].abs()).max(a[0][2].abs()).max(a[1][2].abs().max(a[2][2].abs()));
-    let none = of(0.0);
     let extent = e[0][2].max(e[1][2]).max(e[2][2].max(none)) - e[0][2].min(e[1][2]).min(e[2][2].min(none));
     let flat = det.simd_lt(area * extent * FLAT).to_bitmask();
-    let extents: [f64; 4] = extent.into();
-    let over = of(1.0) / det.max(of(f64::MIN_POSITIVE));
-    let normals: [[[f64; 4]; 3]; 3] = a.map(|a| [a[0] * over * m, a[1] * over * m, a[2] * over].map(Into::into));
-    let planes: [[[f64; 4]; 4]; 3] = planes.map(|p| p.map(Into::into));
-    let det: [f64; 4] = det.into();
-    let kappa = if lens.meet { of(1.0) / w_r } else { of(0.0) };
-    let kappa: [f64; 4] = kappa.into();
+    let empty = !(det.simd_gt(none) & det.simd_lt(of(f64::INFINITY))).to_bitmask();
+    let over = one / det.max(of(f64::MIN_POSITIVE));
+    let reference = of(lens.reference);
+    let [key, ratio] = if lens.meet {
+        let share = reference * kappa;
+        [reference - reference * share, share * share]
+    } else {
+        [w - reference, one]
+    };
+
+    // From here on in f32, and cell by cell: four numbers of each lie together.
+    let [right, down] = [place[0] - ASIDE.x, place[1] - ASIDE.y];
+    let (column, row) = (right.round_ties_even(), down.round_ties_even());
+    let corner = [f64::from(left), f64::from(top)];
+    let places = singles(simd, [column - corner[0], row - corner[1], right - column, down - row]);
+    let keys = singles(simd, [key, ratio, one / ratio, kappa]);
+    let planes = [singles(simd, planes[0]), singles(simd, planes[1]), singles(simd, planes[2])];
+    let mut fields = [[[0.0; 4]; 4]; N];
+    let mut spans = [[[0.0; 4]; 2]; N];
+    let mut finite = f32x4::splat(simd, 0.0);
+    for n in 0..N {
+        let mut v = [[0.0; 4]; 4];
+        for l in 0..cells.len() {
+            for k in 0..4 {
+                v[k][l] = read[l].values[k][n];
+            }
+        }
+        let start = wide(simd, v[0]);
+        let rise = [wide(simd, v[1]) - start, wide(simd, v[2]) - start, wide(simd, v[3]) - start];
+        let v = [
+            f32x4::load_array(simd, v[0]),
+            f32x4::load_array(simd, v[1]),
+            f32x4::load_array(simd, v[2]),
+            f32x4::load_array(simd, v[3]),
+        ];
+        let slope = |x: usize| (rise[0] * a[0][x] + rise[1] * a[1][x] + rise[2] * a[2][x]) * over;
+        fields[n] = by_cell(simd, [v[0], single(simd, slope(0) * m), single(simd, slope(1) * m), single(simd, slope(2))]);
+        let (low, high) = (v[0].min(v[1]).min(v[2].min(v[3])), v[0].max(v[1]).max(v[2].max(v[3])));
+        spans[n] = [low.to_array(), high.to_array()];
+        // NaN if any is not finite.
+        finite += v[0] * 0.0 + v[1] * 0.0 + v[2] * 0.0 + v[3] * 0.0;
+    }
+    let finite = finite.simd_eq(f32x4::splat(simd, 0.0)).to_bitmask();
+    let extents = extent.to_array();
     let end = lens.size.map(|n| n - 1);
     for (l, &cell) in cells.iter().enumerate() {
-        let corners = geometry.cells[cell as usize].corners;
-        // Cells that were dealt have bounds.
-        let b = super::coarse::bounds(lens, &geometry.points, scene.places, corners).unwrap_or([0; 4]);
-        let inside = |v: u32, from: u32, end: u32| v.clamp(from, (from + TILE - 1).min(end)) - from;
+        let b = scene.boxes[cell as usize].map(u32::from);
+        let inside = |v: u32, from: u32, end: u32| (v.clamp(from, (from + TILE - 1).min(end)) - from) as u8;
         let pixels = [
             inside(b[0], left, end[0]),
             inside(b[1], left, end[0]),
@@ -262,38 +429,27 @@ pub(super) fn set_up<S: Simd, const N: usize>(
             let (bit, other) = (away & 1, away >> first[l] & 1);
             away = away & !(1 | 1 << first[l]) | other | bit << first[l];
         }
-        let v = &values[l];
-        let mut span = [[f32::INFINITY, f32::NEG_INFINITY]; N];
-        let mut field = [[0.0; 4]; N];
-        let mut finite = true;
-        for n in 0..N {
-            for corner in v {
-                finite &= corner[n].is_finite();
-                span[n] = [span[n][0].min(corner[n]), span[n][1].max(corner[n])];
-            }
-            let rise = [1, 2, 3].map(|k| f64::from(v[k][n]) - f64::from(v[0][n]));
-            let g = [0, 1, 2].map(|x| (0..3).map(|k| rise[k] * normals[k][x][l]).sum::<f64>() as f32);
-            field[n] = [v[0][n], g[0], g[1], g[2]];
-        }
-        let (mut look, lines) = scene.look(&span, finite);
-        if det[l] == 0.0 || !det[l].is_finite() {
+        let span = spans.map(|s| [s[0][l], s[1][l]]);
+        let lines = if scene.blend == Blend::Composite { scene.lines[cell as usize] } else { [0; 2] };
+        let mut look = if finite >> l & 1 == 1 && lines != UNSEEN { Look::Seen } else { Look::Unseen };
+        if empty >> l & 1 == 1 {
             look = Look::Empty;
-        } else if flat >> l & 1 == 1 {
-            // What is not seen is checked in f64, too.
-            look = if look == Look::Seen { Look::Flat } else { look };
+        } else if flat >> l & 1 == 1 && look == Look::Seen {
+            look = Look::Flat;
         }
-        let order = FRONTS_FIRST[front];
-        let ratio = lens.reference * kappa[l];
-        let ratio = if lens.meet { ratio * ratio } else { 1.0 };
+        let order = u8x16::load_array(simd, FRONTS_FIRST[front]);
+        let sorted = |p: [f32; 4]| f32x4::load_array(simd, p).swizzle_dyn_within_blocks(order).to_array();
+        let [x, y, beside, below] = places[l];
+        let [key, ratio, inverse, kappa] = keys[l];
         records.push(Record {
-            plane: planes.map(|p| order.map(|k| p[k as usize][l] as f32)),
-            at: [at[0][l].round() - f64::from(left), at[1][l].round() - f64::from(top)].map(|v| v as f32),
-            rest: [at[0][l] - at[0][l].round(), at[1][l] - at[1][l].round()].map(|v| v as f32),
-            kappa: kappa[l] as f32,
-            key: [lens.key(depth[l]) as f32, ratio as f32, (1.0 / ratio) as f32],
-            field,
+            plane: [sorted(planes[0][l]), sorted(planes[1][l]), sorted(planes[2][l])],
+            at: [x, y],
+            rest: [beside, below],
+            kappa,
+            key: [key, ratio, inverse],
+            field: fields.map(|f| f[l]),
             span,
-            pixels: pixels.map(|p| p as u8),
+            pixels,
             fronts: front.count_ones() as u8,
             away: away as u8,
             look,
