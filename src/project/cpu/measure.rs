@@ -20,7 +20,7 @@ const MOST_LINES: u16 = 8;
 const ENOUGH: usize = 256;
 
 /// There is room for those of one more cell.
-const WAITING: usize = ENOUGH + ROOM;
+const WAITING: usize = ENOUGH + ROOM + 8;
 
 /// The lanes' numbers.
 const LANES: [i32; 8] = [0, 1, 2, 3, 4, 5, 6, 7];
@@ -116,16 +116,16 @@ impl Fragments {
 }
 
 impl Waiting {
-    /// Whether eight pieces fit.
+    /// Whether eight pieces more do not fit, with zeros for the lanes beyond the last.
     #[inline(always)]
     fn is_full(&self) -> bool {
-        self.count > WAITING - 8
+        self.count > WAITING - 16
     }
 
     /// Keeps up to eight pieces behind the others; `count` says how many they are.
     #[inline(always)]
     fn add<S: Simd>(&mut self, depth: [f32x8<S>; 2], value: [f32x8<S>; 2], length: f32x8<S>, id: i32x8<S>, count: usize) {
-        let at = self.count.min(WAITING - 8);
+        let at = self.count.min(WAITING - 16);
         depth[0].store_slice(&mut self.depth[0][at..at + 8]);
         depth[1].store_slice(&mut self.depth[1][at..at + 8]);
         value[0].store_slice(&mut self.value[0][at..at + 8]);
@@ -164,7 +164,7 @@ impl Waiting {
     /// their slopes.
     #[inline(always)]
     fn composite<S: Simd>(&mut self, simd: S, light: &mut [[f32; 4]; PIXELS], colors: &[[[f32; 4]; 2]], direct: bool) {
-        let count = std::mem::take(&mut self.count).min(WAITING);
+        let count = std::mem::take(&mut self.count).min(WAITING - 8);
         let sum = if direct { &self.sum } else { &self.alpha };
         let absorbed = f32x4::load_array(simd, [0.0, 0.0, 0.0, -1.0]);
         for i in 0..count {
