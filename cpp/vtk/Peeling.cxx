@@ -15,10 +15,14 @@
 #include "vtkOpenGLShaderCache.h"
 #include "vtkOpenGLState.h"
 #include "vtkPixelBufferObject.h"
+#include "vtkRenderState.h"
+#include "vtkRenderer.h"
 #include "vtkShaderProgram.h"
 #include "vtkTextureObject.h"
 #include "vtkVolume.h"
 
+#include <algorithm>
+#include <iterator>
 #include <stdexcept>
 #include <string>
 
@@ -94,6 +98,42 @@ const char* const Answers[] = {
   "void main() { gl_FragData[0] = texture(back, texCoord); }\n",
 };
 
+// What only classes derived from the pass may see of it, and it offers nobody else.
+struct OpenedPass : vtkDualDepthPeelingPass
+{
+  static void Restore(vtkDualDepthPeelingPass* pass)
+  {
+    const vtkRenderState* state = pass->*&OpenedPass::RenderState;
+    if (!state)
+    {
+      return;
+    }
+    auto window = static_cast<vtkOpenGLRenderWindow*>(state->GetRenderer()->GetRenderWindow());
+    vtkOpenGLState*& known = pass->*&OpenedPass::State;
+    if (known != window->GetState())
+    {
+      known = window->GetState();
+      (pass->*&OpenedPass::InitFramebuffer)(state);
+      (pass->*&OpenedPass::Framebuffer)->Bind(OpenGL::DrawFramebuffer);
+    }
+    auto& textures = pass->*&OpenedPass::Textures;
+    if (textures[Back])
+    {
+      return;
+    }
+    std::generate(std::begin(textures), std::end(textures), &vtkTextureObject::New);
+    for (TextureName color : { BackTemp, Back, FrontA, FrontB })
+    {
+      (pass->*&OpenedPass::InitColorTexture)(textures[color], state);
+    }
+    for (TextureName depth : { DepthA, DepthB })
+    {
+      (pass->*&OpenedPass::InitDepthTexture)(textures[depth], state);
+    }
+    (pass->*&OpenedPass::InitOpaqueDepthTexture)(textures[OpaqueDepth], state);
+  }
+};
+
 }
 
 Peeling::Peeling(vtkOpenGLRenderWindow* window)
@@ -115,6 +155,14 @@ vtkOpenGLRenderPass* Peeling::PassOf(vtkAbstractMapper* mapper, vtkVolume* volum
     }
   }
   return nullptr;
+}
+
+void Peeling::Restore(vtkOpenGLRenderPass* pass)
+{
+  if (auto dual = vtkDualDepthPeelingPass::SafeDownCast(pass))
+  {
+    OpenedPass::Restore(dual);
+  }
 }
 
 Peeling::Stage Peeling::StageOf(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolume* volume)

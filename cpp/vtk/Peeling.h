@@ -43,6 +43,11 @@ public:
   // The pass that draws a volume in peels just now; null if none does, or in a way that is not known.
   static vtkOpenGLRenderPass* PassOf(vtkAbstractMapper* mapper, vtkVolume* volume);
 
+  // Gives the pass textures again if it has released its own, and the OpenGL state of the window's new context if that was
+  // finalized: it releases them whenever its window or renderer is told to, but does not survive it in the middle of a
+  // frame. What was peeled is lost, as the window's picture is.
+  static void Restore(vtkOpenGLRenderPass* pass);
+
   // What the pass wants of each pixel, row 0 lowest.
   void Ask(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolume* volume, int width, int height,
     std::vector<Parts>& parts);

@@ -77,18 +77,24 @@ void vtkHaliteMapper::Render(vtkRenderer* renderer, vtkVolume* volume)
                  "first is over, or give the other window a mapper of its own");
     return;
   }
-  const Internals::Turn turn(inner, renderer->GetVTKWindow());
+  const vtkSmartPointer<vtkOpenGLRenderWindow> window = vtkOpenGLRenderWindow::SafeDownCast(renderer->GetVTKWindow());
+  const Internals::Turn turn(inner, window, renderer);
   this->PrepareTime = this->DepthTime = this->CoreTime = this->PresentTime = 0;
   this->TimeToDraw = 0;
 
-  const vtkSmartPointer<vtkOpenGLRenderWindow> window = vtkOpenGLRenderWindow::SafeDownCast(renderer->GetVTKWindow());
   if (!window)
   {
     inner.Say("Halite draws in OpenGL windows only, and this is none");
     return;
   }
   FrameGuard::Keep(window, renderer, volume, this);
+  FrameGuard::KeepContext(window);
+  const bool hadContext = Presenter::HasContext(window);
   inner.DrawIn(window, renderer, volume);
+  if (hadContext)
+  {
+    inner.Mend();
+  }
   FrameGuard::GiveBack(window, volume, this);
 }
 
@@ -106,6 +112,7 @@ void vtkHaliteMapper::Internals::DrawIn(vtkOpenGLRenderWindow* window, vtkRender
   if (!this->DrawsLate && IsPeeled(volume))
   {
     pass = isMaximum ? nullptr : Peeling::PassOf(&this->Self, volume);
+    this->TargetPass = pass;
     if (!pass)
     {
       this->Remark("Halite draws this volume over translucent geometry, not between its layers");

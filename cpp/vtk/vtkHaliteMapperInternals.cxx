@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 #include "vtkHaliteMapperInternals.h"
 
+#include "FrameGuard.h"
 #include "Peeling.h"
 
 #include "vtkCamera.h"
@@ -146,6 +147,21 @@ Content vtkHaliteMapper::Internals::Choose(vtkUnstructuredGridBase* grid, vtkVol
   return Content(settings, grid, array, cellFlag, volume, convention, this->Knots);
 }
 
+void vtkHaliteMapper::Internals::Mend()
+{
+  FrameGuard::GiveBack(this->Target, this->TargetRenderer);
+  // Observers may have drawn elsewhere, or finalized the window: VTK goes on with its frame, and needs what that began with.
+  if (!Presenter::HasContext(this->Target))
+  {
+    this->Target->Start();
+    this->IsReleased = true;
+  }
+  if (this->TargetPass)
+  {
+    Peeling::Restore(this->TargetPass);
+  }
+}
+
 bool vtkHaliteMapper::Internals::Draw(
   const Content& content, const halite::View& view, vtkOpenGLRenderWindow* window, std::vector<float>& pixels)
 {
@@ -180,12 +196,7 @@ bool vtkHaliteMapper::Internals::Draw(
     this->Say(thrown);
   }
   this->Warn();
-  // Observers may have drawn elsewhere, or finalized the window: VTK goes on with its frame, and needs what that began with.
-  if (!Presenter::HasContext(window))
-  {
-    window->Start();
-    this->IsReleased = true;
-  }
+  this->Mend();
   return finished && !this->IsReleased;
 }
 

@@ -88,7 +88,9 @@ struct vtkHaliteMapper::Internals
   // A frame that is at work, in which observers may do anything: whether what it draws to was released since it began, and
   // what was released, which goes when it is over.
   bool IsAtWork = false;
-  vtkWindow* Target = nullptr;
+  vtkOpenGLRenderWindow* Target = nullptr;
+  vtkRenderer* TargetRenderer = nullptr;
+  vtkOpenGLRenderPass* TargetPass = nullptr;
   bool IsReleased = false;
   std::list<Frame> OldFrames;
   std::list<Presenter> OldPresenters;
@@ -97,17 +99,20 @@ struct vtkHaliteMapper::Internals
   class Turn
   {
   public:
-    Turn(Internals& self, vtkWindow* target)
+    Turn(Internals& self, vtkOpenGLRenderWindow* window, vtkRenderer* renderer)
       : Self(self)
     {
       self.IsAtWork = true;
-      self.Target = target;
+      self.Target = window;
+      self.TargetRenderer = renderer;
+      self.TargetPass = nullptr;
       self.IsReleased = false;
     }
     ~Turn()
     {
       this->Self.OldFrames.clear();
       this->Self.OldPresenters.clear();
+      this->Self.Target = nullptr;
       this->Self.IsAtWork = false;
     }
 
@@ -135,6 +140,9 @@ struct vtkHaliteMapper::Internals
   Content Choose(vtkUnstructuredGridBase* grid, vtkVolume* volume);
   // Draws once the renderer has finished.
   void PutOff(vtkRenderer* renderer, vtkVolume* volume);
+
+  // Puts right what observers of the frame that is at work did to what VTK draws it with: its window, renderer and pass.
+  void Mend();
 
   // Draws a volume in a window, or says what is in the way.
   void DrawIn(vtkOpenGLRenderWindow* window, vtkRenderer* renderer, vtkVolume* volume);
