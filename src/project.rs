@@ -5,11 +5,7 @@
 //! a test bed, in which each published variant can be switched on: [`Switches`] are what differs.
 
 pub(crate) mod cpu;
-mod frame;
 pub(crate) mod gpu;
-mod keys;
-mod lines;
-mod record;
 
 use serde::{Deserialize, Serialize};
 
