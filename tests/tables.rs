@@ -249,7 +249,7 @@ fn reference_scenes_by_tables() {
     let mut all = renderers();
     all.truncate(if long { all.len() } else { 1 });
     if !long {
-        eprintln!("on the CPU alone: HALITE_LONG=1 draws on all");
+        eprintln!("skipped in part: the CPU alone draws, HALITE_LONG=1 has devices draw too");
     }
     for name in ["wavelet_smooth", "wavelet_parallel", "wavelet_inside90"] {
         let Some((scene, view, truth)) = reference(name) else { return };
