@@ -75,7 +75,7 @@ bool isRight(halite::Renderer& renderer)
 
 // Large enough to be told of.
 const std::uint32_t Large = 1200;
-std::vector<float> Pixels(4 * Large* Large);
+std::vector<float> Pixels(4 * Large * Large);
 
 }
 
@@ -147,15 +147,22 @@ int main()
   EXPECT(has(mesh(Points, { nullptr, 1, Type::UInt8 }, Offsets, Ids), "cell types"));
   EXPECT(has(mesh(Points, Types, { nullptr, 2, Type::Int32 }, Ids), "offsets"));
   EXPECT(has(mesh(Points, Types, Offsets, { nullptr, 8, Type::Int64 }), "connectivity"));
-  EXPECT(has(mesh({ Points.data(), std::numeric_limits<std::size_t>::max(), Type::Float32 }, Types, Offsets, Ids), "memory"));
+  EXPECT(has(
+    mesh({ Points.data(), std::numeric_limits<std::size_t>::max(), Type::Float32 }, Types, Offsets, Ids), "memory"));
   const auto* bytes = reinterpret_cast<const char*>(Points.data());
   EXPECT(has(mesh({ bytes + 1, 23, Type::Float32 }, Types, Offsets, Ids), "multiple"));
   EXPECT(has(mesh({ Points.data(), 24, static_cast<Type>(77) }, Types, Offsets, Ids), "77"));
   EXPECT(has(mesh({ Points.data(), 23, Type::Float32 }, Types, Offsets, Ids), "23 numbers"));
   halite::Mesh own = cube();
-  EXPECT(has(failure([&] { own.addArray("s", halite::Association::Points, 1, { nullptr, 8, Type::Float64 }); }), "null"));
+  EXPECT(has(failure([&] {
+    own.addArray("s", halite::Association::Points, 1, { nullptr, 8, Type::Float64 });
+  }),
+    "null"));
   EXPECT(has(failure([&] { own.addPolyhedra({ nullptr, 2, Type::Int32 }, Offsets, Ids); }), "null"));
-  EXPECT(has(failure([&] { renderer.setField("s", halite::Association::Points, 1, 0, { nullptr, 8, Type::Int8 }); }), "null"));
+  EXPECT(has(failure([&] {
+    renderer.setField("s", halite::Association::Points, 1, 0, { nullptr, 8, Type::Int8 });
+  }),
+    "null"));
   EXPECT(has(failure([&] { renderer.movePoints({ nullptr, 24, Type::Float64 }); }), "null"));
   EXPECT(has(failure([&] { renderer.render(view(16), nullptr); }), "pixels"));
   EXPECT(has(failure([] { halite::saveImage("nothing.png", 4, 4, nullptr); }), "pixels"));
@@ -197,8 +204,8 @@ int main()
   }
   halite::Renderer first(settings[0]), second(settings[1]);
   user = &first;
-  const halite::Mesh surface(Points, std::vector<std::uint8_t>{ 9 }, std::vector<std::int32_t>{ 0, 4 },
-    std::vector<std::int32_t>{ 0, 1, 2, 3 });
+  const halite::Mesh surface(
+    Points, std::vector<std::uint8_t>{ 9 }, std::vector<std::int32_t>{ 0, 4 }, std::vector<std::int32_t>{ 0, 1, 2, 3 });
   first.setMesh(surface);
   EXPECT(!lines[0].empty() && has(lines[0][0], "nothing is drawn") && lines[1].empty());
   user = nullptr;

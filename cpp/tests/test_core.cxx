@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <utility>
 #include <thread>
+#include <utility>
 
 namespace
 {
@@ -210,11 +210,18 @@ int main(int argc, char** argv)
   EXPECT(has(failure([] { halite::Mesh::open("/no/such/file.vtu"); }), "/no/such/file.vtu"));
   EXPECT(has(failure([&] { renderer.setField(mesh, "nothing"); }), "nothing"));
   EXPECT(has(failure([&] { renderer.setField(mesh, "v", 3); }), "component"));
-  EXPECT(has(failure([&] { renderer.setField("few", halite::Association::Points, 1, 0, std::vector<double>{ 1 }); }), "1 value"));
+  EXPECT(has(failure([&] { renderer.setField("few", halite::Association::Points, 1, 0, std::vector<double>{ 1 }); }),
+    "1 value"));
   EXPECT(has(failure([] { halite::Renderer({ 0, "no such device", "", "" }); }), "no such device"));
   EXPECT(has(failure([] { halite::Renderer({ 0, "cpu", "magic", "" }); }), "traverse"));
-  EXPECT(has(failure([&] { halite::Mesh(points, types, offsets, std::vector<std::int32_t>{ 0, 1, 2, 3, 4, 5, 6, 8 }); }), "point 8"));
-  EXPECT(has(failure([&] { halite::Mesh(points, types, offsets, std::vector<std::int32_t>{ 0, 1, 2, 3, 4, 5, 6, -1 }); }), "negative"));
+  EXPECT(has(failure([&] {
+    halite::Mesh(points, types, offsets, std::vector<std::int32_t>{ 0, 1, 2, 3, 4, 5, 6, 8 });
+  }),
+    "point 8"));
+  EXPECT(has(failure([&] {
+    halite::Mesh(points, types, offsets, std::vector<std::int32_t>{ 0, 1, 2, 3, 4, 5, 6, -1 });
+  }),
+    "negative"));
   halite::View none = view;
   none.width = 0;
   float buffer[4];

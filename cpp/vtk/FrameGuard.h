@@ -28,7 +28,8 @@ class FrameGuard : public vtkCommand
 public:
   // Keeps a volume and its mapper, the renderer and all that is in it, and what VTK knows of the window's OpenGL state: a
   // window that is finalized makes another one, while VTK goes on with the one that it had.
-  static void Keep(vtkOpenGLRenderWindow* window, vtkRenderer* renderer, vtkVolume* volume, vtkAbstractVolumeMapper* mapper);
+  static void Keep(
+    vtkOpenGLRenderWindow* window, vtkRenderer* renderer, vtkVolume* volume, vtkAbstractVolumeMapper* mapper);
 
   // VTK asks a volume's mapper for its time when that has drawn, be there one or not: a volume that has lost its mapper has
   // it back until the frame is over.

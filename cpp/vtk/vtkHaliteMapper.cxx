@@ -73,8 +73,9 @@ void vtkHaliteMapper::Render(vtkRenderer* renderer, vtkVolume* volume)
   const vtkSmartPointer<vtkVolume> keptVolume(volume);
   if (inner.IsAtWork)
   {
-    inner.Remark("this mapper is drawing a frame, and leaves out the one that an observer of that asks for: draw when the "
-                 "first is over, or give the other window a mapper of its own");
+    inner.Remark(
+      "this mapper is drawing a frame, and leaves out the one that an observer of that asks for: draw when the "
+      "first is over, or give the other window a mapper of its own");
     return;
   }
   const vtkSmartPointer<vtkOpenGLRenderWindow> window = vtkOpenGLRenderWindow::SafeDownCast(renderer->GetVTKWindow());

@@ -62,8 +62,8 @@ void vtkHaliteMapper::Internals::Release(vtkWindow* window)
   };
   this->IsReleased |= window == this->Target;
   // Where a renderer comes to a window VTK releases what is of no window: that is nothing of ours.
-  take(this->Frames, this->OldFrames,
-    [&](const Frame& f) { return !f.Renderer || f.Renderer->GetVTKWindow() == window; });
+  take(
+    this->Frames, this->OldFrames, [&](const Frame& f) { return !f.Renderer || f.Renderer->GetVTKWindow() == window; });
   take(this->Presenters, this->OldPresenters,
     [&](const Presenter& p) { return !p.GetWindow() || p.GetWindow() == window; });
 }
@@ -207,7 +207,8 @@ bool vtkHaliteMapper::Internals::Show(
   const int width = static_cast<int>(view.View.width), height = static_cast<int>(view.View.height);
   std::vector<float> depths;
   // Where nothing was drawn and nothing kept, nothing ends rays.
-  if (viewport.IsOfPass || renderer->GetNumberOfPropsRendered() > 0 || renderer->GetPreserveDepthBuffer() || !renderer->GetErase())
+  if (viewport.IsOfPass || renderer->GetNumberOfPropsRendered() > 0 || renderer->GetPreserveDepthBuffer() ||
+    !renderer->GetErase())
   {
     Clock clock(this->Self.DepthTime);
     Presenter::ReadDepths(presenter.GetWindow(), viewport, width, height, depths);
@@ -285,8 +286,7 @@ void vtkHaliteMapper::Internals::PutOff(vtkRenderer* renderer, vtkVolume* volume
     [&](const Late& l) { return l.Renderer == renderer && l.Volume == volume; });
   if (!waits)
   {
-    const unsigned long observer =
-      renderer->AddObserver(vtkCommand::EndEvent, &this->Self, &vtkHaliteMapper::DrawLate);
+    const unsigned long observer = renderer->AddObserver(vtkCommand::EndEvent, &this->Self, &vtkHaliteMapper::DrawLate);
     this->Lates.push_back({ renderer, volume, observer });
   }
 }

@@ -148,7 +148,8 @@ struct vtkHaliteMapper::Internals
   void DrawIn(vtkOpenGLRenderWindow* window, vtkRenderer* renderer, vtkVolume* volume);
 
   // These are false if what they draw was given up. By the core:
-  bool Draw(const Content& content, const halite::View& view, vtkOpenGLRenderWindow* window, std::vector<float>& pixels);
+  bool Draw(
+    const Content& content, const halite::View& view, vtkOpenGLRenderWindow* window, std::vector<float>& pixels);
   // Into the window, as one picture:
   bool Show(const Content& content, SceneView& view, const Viewport& viewport, Presenter& presenter, Frame& frame);
   // Into the layers of a pass of depth peeling:
