@@ -223,7 +223,7 @@ fn much_of_little_is_refused() {
         faces.concat()
     );
     refused(file.as_bytes(), 16 * file.len(), "a face has two sides");
-    // A tag that does not end in a file of 20 MB: it is given up after 1 MiB, twice as much while room for it grows.
+    // A tag that does not end in a file of 20 MB: it is given up after 256 KiB.
     let at = text.windows(8).position(|w| w == b"<Points>").unwrap();
     refused(&[&text[..at], b"<Points a=\"", &vec![b'x'; 20 << 20][..]].concat(), 4 << 20, "a tag has more than");
     // Sizes that nobody has, and that the file's own numbers agree on.

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 // The core's C++ face, without VTK: test_core CUBE.vtu FOLDER
+#include "core.h"
 #include "expect.h"
-
-#include <halite.h>
 
 #include <algorithm>
 #include <cmath>
@@ -13,26 +12,6 @@
 namespace
 {
 
-// What a call throws; empty if nothing.
-template <class Work>
-std::string failure(Work work)
-{
-  try
-  {
-    work();
-  }
-  catch (const halite::Error& error)
-  {
-    return error.what();
-  }
-  return "";
-}
-
-bool has(const std::string& text, const char* word)
-{
-  return text.find(word) != std::string::npos;
-}
-
 halite::TransferFunction tent()
 {
   halite::TransferFunction f;
@@ -41,21 +20,16 @@ halite::TransferFunction tent()
   return f;
 }
 
-halite::View fromAbove()
+halite::View clippedFromAbove()
 {
-  halite::View view;
-  view.width = view.height = 32;
-  view.camera.position = { 0.5, 0.5, 5 };
-  view.camera.focalPoint = { 0.5, 0.5, 0.5 };
-  view.camera.parallel = true;
-  view.camera.parallelScale = 0.4;
+  halite::View view = fromAbove(32);
   view.camera.clippingRange = { 1, 9 };
   return view;
 }
 
 halite::View slanted()
 {
-  halite::View view = fromAbove();
+  halite::View view = clippedFromAbove();
   view.camera.position = { 3, -2, 4 };
   return view;
 }
@@ -112,7 +86,7 @@ int main(int argc, char** argv)
   renderer.setMesh(mesh);
   renderer.setField(mesh, "s");
   renderer.setTransferFunction(tent());
-  const halite::View view = fromAbove();
+  const halite::View view = clippedFromAbove();
   EXPECT(isAll(draw(renderer, view), Whole));
   const auto statistics = renderer.statistics();
   EXPECT(statistics.tetrahedra == 6 && statistics.cells == 1 && statistics.steps > 0 && !statistics.adapter.empty());

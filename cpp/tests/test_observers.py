@@ -211,18 +211,12 @@ def test_actions_in_abort_checks():
 
 def test_a_frame_in_a_frame_is_refused_in_its_own_words():
     s = Stage()
-    said = []
-
-    def note(_, __, text):
-        said.append(text)
-
-    note.CallDataType = vtkCommonCore.VTK_STRING
-    s.mapper.AddObserver("WarningEvent", note)
-    s.mapper.AddObserver("ErrorEvent", note)
+    warnings, errors = messages(s.mapper, "WarningEvent"), messages(s.mapper)
     for _ in range(2):
         s.calls = 0
         s.observe(render_other)
         s.renderers[0].GetActiveCamera().Azimuth(5)
+    said = warnings + errors
     assert len(said) == 1 and "drawing a frame" in said[0] and "failed" not in said[0], said
 
 

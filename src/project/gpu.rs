@@ -243,6 +243,7 @@ impl Project {
             let start = Instant::now();
             self.ordered = None;
             self.ordered = Some(self.order(&frame, &seen, geometry, values, switches, lines)?);
+            counts.sorts = 1;
             counts.order_ms = start.elapsed().as_secs_f64() * 1e3;
         }
         self.draw(&frame, view, &mut counts).map(|pixels| (pixels, counts))

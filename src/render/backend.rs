@@ -228,8 +228,8 @@ fn project_on<const N: usize>(project: &mut Project, frame: &Frame, values: &Val
     let Frame { mesh, exact, table, view, switches, .. } = frame;
     let (pixels, counts) = project.render(&mesh.geometry, values, exact, *table, view, switches)?;
     let _ = (frame.progress)(1.0);
-    let project::Counts { cells, order_ms, project_ms, draw_ms, fragments } = counts;
-    let stats = ProjectionStats { drawn_cells: cells, order_ms, project_ms, draw_ms, fragments };
+    let project::Counts { cells, order_ms, sorts, project_ms, draw_ms, fragments } = counts;
+    let stats = ProjectionStats { drawn_cells: cells, order_ms, sorts, project_ms, draw_ms, fragments };
     let device_ms = project_ms.zip(draw_ms).map(|(p, d)| p + d);
     Ok(Drawn { pixels, device_ms, projection: Some(stats), ..Drawn::default() })
 }

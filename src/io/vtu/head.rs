@@ -408,7 +408,7 @@ impl Head {
 
 /// Bytes that a tag or comment may have. It is kept in memory as a whole: without its end, that would be the rest of
 /// the file.
-const MOST_OF_A_TAG: usize = 1 << 20;
+const MOST_OF_A_TAG: usize = 1 << 18;
 
 /// A file of which so many bytes may be taken.
 struct Limited {
