@@ -271,7 +271,10 @@ fn warn_of_left_out(path: &Path, arrays: &mut Vec<LeftOut>) {
 /// [`Error::Unsupported`] for a kind of data set that is no grid that is read.
 fn refuse(path: &Path, kind: &str) -> Error {
     let known = REFUSED.iter().find(|known| known.1.eq_ignore_ascii_case(kind));
-    let what = known.map_or("a kind that Halite does not read; it reads unstructured and structured grids (.vtu, .vti, .vtr, .vts)", |known| known.2);
+    let what = known.map_or(
+        "a kind that Halite does not read; it reads unstructured and structured grids (.vtu, .vti, .vtr, .vts)",
+        |known| known.2,
+    );
     Error::unsupported(path, format!("it holds \"{}\": {what}", kind.escape_debug()))
 }
 

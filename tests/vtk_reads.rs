@@ -98,7 +98,10 @@ fn differences(mesh: &Mesh, dump: &[(Vec<String>, Vec<u8>)], exact: bool) -> Vec
         match words[0].as_str() {
             "points" => {
                 let ours: Vec<f64> = mesh.points().iter().flat_map(DVec3::to_array).collect();
-                check("points", near(&ours, &numbers(&words[1], bytes), if cells.types.contains(&11) { 1e-15 } else { 0.0 }));
+                check(
+                    "points",
+                    near(&ours, &numbers(&words[1], bytes), if cells.types.contains(&11) { 1e-15 } else { 0.0 }),
+                );
             }
             "types" => check("types", cells.types == *bytes),
             "ends" => {
@@ -227,7 +230,8 @@ fn reads_the_same(python: &Path, vtk: &str) {
             Err(error) if path.starts_with(&written) => wrong.push(error.to_string()),
             Err(error) => eprintln!("refused: {error}"),
             Ok(mesh) => {
-                let exact = path.starts_with(&written) && path.extension().is_some_and(|e| !e.to_string_lossy().starts_with('p'));
+                let exact = path.starts_with(&written)
+                    && path.extension().is_some_and(|e| !e.to_string_lossy().starts_with('p'));
                 let differs = differences(&mesh, &dump, exact);
                 equal += usize::from(differs.is_empty());
                 if !differs.is_empty() {

@@ -196,7 +196,7 @@ pub(crate) fn write_grid(style: Style, kind: &str, attributes: &str, pieces: &[W
         }
         head += "</Piece>\n";
     }
-    write!(head, "</{kind}>\n").unwrap();
+    writeln!(head, "</{kind}>").unwrap();
     let mut file = head.into_bytes();
     if matches!(style.mode, Mode::AppendedRaw | Mode::AppendedBase64) {
         let encoding = if style.mode == Mode::AppendedRaw { "raw" } else { "base64" };

@@ -102,9 +102,7 @@ fn written(style: Style, kind: &str, pieces: &[([usize; 3], [usize; 3])]) -> Vec
     };
     let pieces: Vec<Written> = pieces.iter().map(|&(low, size)| piece(low, size, more(low, size))).collect();
     let attributes = match kind {
-        "ImageData" => format!(
-            "{EXTENT} Origin=\"10 20 30\" Spacing=\"0.5 2 0.25\" Direction=\"0 -1 0 1 0 0 0 0 1\""
-        ),
+        "ImageData" => format!("{EXTENT} Origin=\"10 20 30\" Spacing=\"0.5 2 0.25\" Direction=\"0 -1 0 1 0 0 0 0 1\""),
         _ => EXTENT.to_owned(),
     };
     write_grid(style, kind, &attributes, &pieces)
@@ -180,7 +178,8 @@ fn lists_of_pieces() {
         assert_eq!(joined, read_set("a", &written(PLAIN, kind, &WHOLE)).unwrap(), "{kind}");
         // A series of one file is what that is.
         let series = folder.path().join("a.pvd");
-        let text = format!("<VTKFile type='Collection'><Collection><DataSet file='a.p{extension}'/></Collection></VTKFile>");
+        let text =
+            format!("<VTKFile type='Collection'><Collection><DataSet file='a.p{extension}'/></Collection></VTKFile>");
         std::fs::write(&series, text).unwrap();
         assert_eq!(Source::open(&series).unwrap().read_data_set(0, &|_| ()).unwrap(), joined, "{kind}");
     }
@@ -215,9 +214,11 @@ fn holes_and_ghosts_of_pieces() {
         let pieces = [own(0, 1.0, [0, ghost[0]]), own(1, 2.0, [ghost[1], 0])];
         grid("a.vti", &write_grid(PLAIN, "ImageData", "WholeExtent=\"0 3 0 1 0 1\"", &pieces))
     };
-    for (ghost, expected, marks) in
-        [([1, 0], [1.0, 2.0, 2.0], [0.0; 3]), ([0, 1], [1.0, 1.0, 2.0], [0.0; 3]), ([1, 1], [1.0, 1.0, 2.0], [0.0, 1.0, 0.0])]
-    {
+    for (ghost, expected, marks) in [
+        ([1, 0], [1.0, 2.0, 2.0], [0.0; 3]),
+        ([0, 1], [1.0, 1.0, 2.0], [0.0; 3]),
+        ([1, 1], [1.0, 1.0, 2.0], [0.0, 1.0, 0.0]),
+    ] {
         let joined = overlapping(ghost);
         assert_eq!(floats(&joined.cell_arrays()[0].values), expected);
         assert_eq!(floats(&joined.cell_arrays()[1].values), marks);
@@ -235,10 +236,12 @@ fn structured_grids_are_hexahedra() {
         let layer = |k: usize| around.map(|[x, y]| corner([i + x, j + y, k]));
         assert_eq!(mesh.cells().points(c), [layer(k), layer(k + 1)].concat());
     }
-    let flat = write_grid(PLAIN, "StructuredGrid", "WholeExtent=\"0 3 0 0 0 4\"", &[(
-        "Extent=\"0 3 0 0 0 4\"".to_owned(),
-        vec![points([0; 3], [4, 1, 5])],
-    )]);
+    let flat = write_grid(
+        PLAIN,
+        "StructuredGrid",
+        "WholeExtent=\"0 3 0 0 0 4\"",
+        &[("Extent=\"0 3 0 0 0 4\"".to_owned(), vec![points([0; 3], [4, 1, 5])])],
+    );
     let flat = self::mesh("a.vts", &flat);
     assert_eq!(flat.cells().types, [9; 12]);
     assert_eq!(flat.cells().points(0), [0, 1, 5, 4]);
@@ -256,8 +259,7 @@ fn legacy_grids() {
     let image = grid("a.vtk", image.as_bytes());
     assert_eq!(image.point([3, 2, 4]), DVec3::new(12.5, 22.0, 31.0));
     let axes = [("X", &X[..]), ("Y", &Y), ("Z", &Z)];
-    let axes: String =
-        axes.iter().map(|(a, c)| format!("{a}_COORDINATES {} double\n{}\n", c.len(), text(c))).collect();
+    let axes: String = axes.iter().map(|(a, c)| format!("{a}_COORDINATES {} double\n{}\n", c.len(), text(c))).collect();
     let uneven = grid("a.vtk", (head("RECTILINEAR_GRID") + &axes + &data).as_bytes());
     assert_eq!(uneven.axes(), &[X.to_vec(), Y.to_vec(), Z.to_vec()]);
     let places: Vec<f64> = indices(SIZE).flat_map(|p| bent(p).to_array()).collect();
@@ -270,7 +272,8 @@ fn legacy_grids() {
     for arrays in [image.cell_arrays(), uneven.cell_arrays(), curved.cell_arrays()] {
         assert_eq!(arrays, &cell_data([0; 3], SIZE));
     }
-    let binary = b"# vtk DataFile Version 5.1\nt\nBINARY\nDATASET STRUCTURED_POINTS\nEXTENT 1 2 0 1 5 5\nSPACING 1 1 2\n\
+    let binary =
+        b"# vtk DataFile Version 5.1\nt\nBINARY\nDATASET STRUCTURED_POINTS\nEXTENT 1 2 0 1 5 5\nSPACING 1 1 2\n\
         ORIGIN 0 0 0\nPOINT_DATA 4\nSCALARS s short\nLOOKUP_TABLE default\n\0\x01\0\x02\x01\0\xff\xff\n";
     let binary = grid("a.vtk", binary);
     assert_eq!((binary.size(), binary.point([0, 0, 0])), ([2, 2, 1], DVec3::new(1.0, 0.0, 10.0)));

@@ -227,7 +227,8 @@ def write_blocks(folder):
             (writer.SetFileTypeToBinary if binary else writer.SetFileTypeToASCII)()
             writer.Write()
         writer = getattr(vtk, f"vtkXMLP{kind}Writer")()
-        writer.SetInputData(grid)
+        # Lists of images tell no directions.
+        writer.SetInputData(straight if kind == "ImageData" else grid)
         writer.SetFileName(os.path.join(folder, f"{kind}.p{extensions[kind]}"))
         writer.SetNumberOfPieces(3)
         writer.SetStartPiece(0)

@@ -2,11 +2,11 @@
 
 use super::place::Kind;
 use crate::error::{Error, Result};
+use crate::grid::Lattice;
+use crate::io::blocks::Block;
 use crate::io::data::{Appended, Data, DataArray, Store};
 use crate::io::input::{Input, Opened};
 use crate::io::number::Kind as NumberKind;
-use crate::grid::Lattice;
-use crate::io::blocks::Block;
 use crate::io::refuse;
 use crate::mesh::{Attributes, LeftOut, Role};
 use quick_xml::Reader;

@@ -20,8 +20,7 @@ impl Grid<'_> {
         };
         let mut points = if kind == Kind::Structured { self.points()? } else { vec![] };
         let ((mut of_points, points_left_out), (mut of_cells, cells_left_out)) = {
-            let (of_points, of_cells) =
-                rayon::join(|| self.data(Section::PointData), || self.data(Section::CellData));
+            let (of_points, of_cells) = rayon::join(|| self.data(Section::PointData), || self.data(Section::CellData));
             (of_points?, of_cells?)
         };
         if blocks.len() > 1 {
@@ -41,9 +40,7 @@ impl Grid<'_> {
                 (lattice.first, lattice.size) = (whole.low, size);
                 grid::Grid::regular(&lattice, of_points, of_cells).map(DataSet::Grid)
             }
-            Kind::Rectilinear => {
-                grid::Grid::rectilinear(self.axes(&whole)?, of_points, of_cells).map(DataSet::Grid)
-            }
+            Kind::Rectilinear => grid::Grid::rectilinear(self.axes(&whole)?, of_points, of_cells).map(DataSet::Grid),
             Kind::Structured | Kind::Unstructured => grid::cells(size, grid::BENT)
                 .and_then(|cells| Mesh::new(points, cells, of_points, of_cells))
                 .map(DataSet::Mesh),
@@ -80,9 +77,7 @@ impl Grid<'_> {
         };
         match piece.arrays(Section::Coordinates).get(a) {
             None => Err(fail("are missing")),
-            Some(array) if array.components != 1 => {
-                Err(fail(&format!("have {} components, not 1", array.components)))
-            }
+            Some(array) if array.components != 1 => Err(fail(&format!("have {} components, not 1", array.components))),
             Some(array) => self.floats(piece, array, count),
         }
     }
@@ -93,8 +88,8 @@ fn fill(axis: &mut [f64]) {
     let known: Vec<usize> = (0..axis.len()).filter(|i| !axis[*i].is_nan()).collect();
     for w in known.windows(2) {
         let (from, to) = (axis[w[0]], axis[w[1]]);
-        for i in w[0] + 1..w[1] {
-            axis[i] = from + (to - from) * (i - w[0]) as f64 / (w[1] - w[0]) as f64;
+        for (i, c) in axis[w[0]..w[1]].iter_mut().enumerate().skip(1) {
+            *c = from + (to - from) * i as f64 / (w[1] - w[0]) as f64;
         }
     }
 }
