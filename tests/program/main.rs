@@ -353,9 +353,10 @@ fn variants_of_the_projection_engine() {
     assert!(draw("") == draw("--dither") && draw("--dither=false") != draw(""));
     let Ran(code, _, err) = place.run("study dithered.json --out sheet.png --frames 1");
     assert!(code == Some(0) && err.contains("projection"), "{err}");
-    let Ran(code, out, err) = place
-        .run("study cube.vtu --integrals --table 64x64x32 --out forms.png --json forms.json --frames 1 --size 24x16 \
-            --opacity 0:0.01,6:0.05 --unit-distance 1");
+    let Ran(code, out, err) = place.run(
+        "study cube.vtu --integrals --table 64x64x32 --out forms.png --json forms.json --frames 1 --size 24x16 \
+            --opacity 0:0.01,6:0.05 --unit-distance 1",
+    );
     assert_eq!((code, err.as_str()), (Some(0), ""));
     assert!(out.contains("polynomial, degree 2") && out.contains("plane per cell"), "{out}");
     let forms: serde_json::Value =
