@@ -63,7 +63,7 @@ struct vtkHaliteMapper::Internals
   };
 
   // What is to be drawn once a renderer has finished.
-  struct Late
+  struct DeferredDraw
   {
     vtkWeakPointer<vtkRenderer> Renderer;
     vtkWeakPointer<vtkVolume> Volume;
@@ -80,11 +80,11 @@ struct vtkHaliteMapper::Internals
   // What of the content failed since something was drawn, and what for: nothing of that is tried, and nothing is said, twice.
   Key Failed;
   std::set<std::string> Errors;
-  std::set<std::string> Remarks;
+  std::set<std::string> Warned;
   std::vector<float> Pixels;
   std::string Adapter;
-  std::list<Late> Lates;
-  bool DrawsLate = false;
+  std::list<DeferredDraw> DeferredDraws;
+  bool DrawsDeferred = false;
   // A frame that is at work, in which observers may do anything: whether what it draws to was released since it began, and
   // what was released, which goes when it is over.
   bool IsAtWork = false;
@@ -126,12 +126,12 @@ struct vtkHaliteMapper::Internals
   }
 
   // An error, once until something is drawn; a warning of the mapper's own, once.
-  void Say(const std::string& what);
-  void Remark(const std::string& what);
+  void ErrorOnce(const std::string& what);
+  void WarnOnce(const std::string& what);
   // Warnings of the core.
-  void Warn();
+  void ReportWarnings();
   // What of the property is not drawn.
-  void RemarkOn(vtkVolumeProperty* property);
+  void WarnOfUnsupported(vtkVolumeProperty* property);
 
   Presenter& PresenterOf(vtkOpenGLRenderWindow* window);
   Frame& FrameOf(vtkRenderer* renderer, vtkVolume* volume);
@@ -139,7 +139,7 @@ struct vtkHaliteMapper::Internals
   void Release(vtkWindow* window);
   Content Choose(vtkUnstructuredGridBase* grid, vtkVolume* volume);
   // Draws once the renderer has finished.
-  void PutOff(vtkRenderer* renderer, vtkVolume* volume);
+  void Defer(vtkRenderer* renderer, vtkVolume* volume);
 
   // Puts right what observers of the frame that is at work did to what VTK draws it with: its window, renderer and pass.
   void Mend();

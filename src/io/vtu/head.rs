@@ -189,7 +189,7 @@ impl Head {
             lattice: Lattice::default(),
             whole: None,
         };
-        let inner = BufReader::with_capacity((length as usize).clamp(1 << 10, 1 << 18), file);
+        let inner = BufReader::with_capacity((length as usize).clamp(1 << 10, 1 << 16), file);
         let mut reader = Reader::from_reader(Limited { inner, left: MOST_OF_A_TAG });
         let mut buffer = Vec::new();
         loop {
