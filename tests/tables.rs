@@ -97,16 +97,16 @@ const THIN: f64 = 0.02;
 /// some forms are of no use: no bound would tell a wrong table.
 fn forms() -> Vec<(Choice, Option<f64>, f64)> {
     vec![
-        (volume(Kind::Uniform, [128, 128, 32]), Some(5e-3), 1e-4),
-        (volume(Kind::Log, [128, 128, 32]), None, 1e-4),
-        (volume(Kind::LogNormalised, [128, 128, 12]), Some(2e-3), 1e-4),
-        (polynomial(1), Some(3e-3), 1e-4),
-        (polynomial(2), Some(2e-3), 1e-4),
-        (Choice { alpha: Alpha::Linear, ..polynomial(2) }, None, 1e-4),
-        (cylindrical(Planes::Two), Some(2e-2), 1e-4),
-        (cylindrical(Planes::Packed), Some(2e-2), 1e-4),
-        (cylindrical(Planes::One), None, 1e-4),
-        (Choice { texels: Texels::Unorm8, ..volume(Kind::LogNormalised, [128, 128, 12]) }, None, 1e-4),
+        (volume(Kind::Uniform, [128, 128, 32]), Some(5e-3), 4e-4),
+        (volume(Kind::Log, [128, 128, 32]), None, 8.5e-3),
+        (volume(Kind::LogNormalised, [128, 128, 12]), Some(2e-3), 4e-4),
+        (polynomial(1), Some(3e-3), 4e-4),
+        (polynomial(2), Some(2e-3), 4e-4),
+        (Choice { alpha: Alpha::Linear, ..polynomial(2) }, None, 5e-3),
+        (cylindrical(Planes::Two), Some(2e-2), 1.6e-3),
+        (cylindrical(Planes::Packed), Some(2e-2), 1.6e-3),
+        (cylindrical(Planes::One), None, 4e-3),
+        (Choice { texels: Texels::Unorm8, ..volume(Kind::LogNormalised, [128, 128, 12]) }, None, 6e-4),
     ]
 }
 
