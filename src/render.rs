@@ -1,6 +1,7 @@
 //! The whole flow behind one door: mesh, field, transfer function and view in, image out.
 
 mod backend;
+mod grid;
 mod prepared;
 mod stats;
 mod tables;
@@ -22,6 +23,7 @@ use crate::transfer::TransferFunction;
 use crate::view::{Blend, View};
 use backend::{Backend, Drawn};
 use glam::DVec3;
+use grid::LoadedGrid;
 use prepared::{AnyValues, Prepared};
 pub use stats::{ProjectionStats, Stats, SweepStats};
 use std::ops::ControlFlow;
@@ -52,6 +54,8 @@ pub struct Renderer {
     backend: Backend,
     switches: Switches,
     mesh: Option<Loaded>,
+    /// The grid that is drawn, in place of a mesh.
+    grid: Option<LoadedGrid>,
     field: Option<Prepared>,
     transfer: Option<TransferFunction>,
     exact: Option<Exact<f32>>,
@@ -169,6 +173,7 @@ impl Renderer {
             backend,
             switches: Switches::default(),
             mesh: None,
+            grid: None,
             field: None,
             transfer: None,
             exact: None,
@@ -191,6 +196,9 @@ impl Renderer {
     fn name_device(&mut self) {
         // Whether tables are built on the device depends on it.
         self.key = None;
+        if self.grid.is_some() {
+            return self.name_caster();
+        }
         let flat = self.mesh.as_ref().is_some_and(|m| m.flat);
         self.stats.engine = if flat { Backend::without_device().engine() } else { self.backend.engine() }.into();
         if flat && self.backend.gpu().is_some() && self.stats.device != "cpu" {
@@ -255,6 +263,7 @@ impl Renderer {
         tetrahedra: Tetrahedra,
         report: &(dyn Fn(f64) + Sync),
     ) {
+        self.grid = None;
         let start = Instant::now();
         let (connected, on_device) = (self.backend.needs_neighbours(), self.backend.gpu().is_some());
         let mesh = self.pool.install(|| Loaded::new(points, cells, tetrahedra, connected, on_device, report));
@@ -316,11 +325,14 @@ impl Renderer {
         Ok(())
     }
 
-    /// Draws another field of the mesh from now on.
+    /// Draws another field of the mesh, or grid, from now on.
     ///
     /// # Errors
-    /// [`Error::Render`] if there is no mesh; [`Error::Field`] if the field does not fit it.
+    /// [`Error::Render`] if there is neither; [`Error::Field`] if the field does not fit it.
     pub fn set_field(&mut self, field: &Field) -> Result<()> {
+        if self.grid.is_some() {
+            return self.set_grid_field(field);
+        }
         let start = Instant::now();
         let mesh = self.mesh.as_ref().ok_or_else(|| Error::Render("a field needs a mesh first".into()))?;
         let tables = self.integral.form != Form::Exact;
@@ -337,6 +349,9 @@ impl Renderer {
     /// Draws with another transfer function from now on.
     pub fn set_transfer(&mut self, transfer: &TransferFunction) {
         self.transfer = Some(transfer.clone());
+        if let Some(grid) = &mut self.grid {
+            grid.forget_function();
+        }
         self.forget(Part::Function);
     }
 
@@ -424,6 +439,9 @@ impl Renderer {
     }
 
     fn try_render(&mut self, view: &View, progress: &Progress) -> Result<Image> {
+        if self.grid.is_some() {
+            return self.cast(view, progress);
+        }
         let start = Instant::now();
         let missing = |what: &str| Error::Render(format!("there is no {what} to draw"));
         let flat = self.mesh.as_ref().is_some_and(|m| m.flat);

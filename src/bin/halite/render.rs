@@ -5,6 +5,7 @@ use clap::{Args, ValueEnum};
 use glam::DVec3;
 use halite::field::{Association, Component, Field, Kind};
 use halite::gpu::DeviceChoice;
+use halite::grid::Grid;
 use halite::image::{Backdrop, Image};
 use halite::integral::choice::{Choice, Form};
 use halite::io::Time;
@@ -213,7 +214,7 @@ fn all_times(options: &Options, given: Option<Scene>, renderer: &mut Renderer) -
 fn range_of_all(request: &Request, count: usize) -> Result<Option<[f64; 2]>> {
     let (mut all, mut scalars) = (None::<[f64; 2]>, None);
     for step in 0..count {
-        let mesh = input::mesh(&request.input, Some(Time::Step(step)))?;
+        let (mesh, _) = input::mesh(&request.input, Some(Time::Step(step)))?;
         let tetrahedra = Tetrahedra::new(&mesh).with_context(|| request.input.display().to_string())?;
         let scalars = match &scalars {
             Some(first) => first,
@@ -237,7 +238,10 @@ pub(crate) struct Steps {
 
 /// Everything that a picture takes, and how long it took to get.
 pub(crate) struct Job {
+    /// What is drawn; of a grid, some of its cells.
     pub(crate) mesh: Mesh,
+    /// What is drawn in place of the mesh.
+    pub(crate) grid: Option<Grid>,
     pub(crate) tetrahedra: Tetrahedra,
     pub(crate) field: Field,
     pub(crate) scene: Scene,
@@ -256,9 +260,10 @@ fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut Steps) -> R
     let from_file = given.is_some();
     let start = Instant::now();
     let path = given.as_ref().map_or(options.input.clone(), |scene| scene.mesh.clone());
-    let mut mesh = input::mesh(&path, steps.time)?;
+    let (mut mesh, mut grid) = input::mesh(&path, steps.time)?;
     if let Some(by) = options.scale {
         mesh = mesh.scaled(by).with_context(|| path.display().to_string())?;
+        grid = grid.map(|grid| grid.scaled(by)).transpose()?;
     }
     let load_ms = ms(start);
     let start = Instant::now();
@@ -282,6 +287,12 @@ fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut Steps) -> R
         let field = scalars.field(&mesh).with_context(|| path.display().to_string())?;
         options.check(&field)?;
         (scalars, field)
+    };
+    // The field of all of a grid is drawn, and that of some of it looked at.
+    let whole = match &grid {
+        Some(grid) if solid => Some(automatic::solid(grid)?.0),
+        Some(grid) => Some(scalars.field(grid).with_context(|| path.display().to_string())?),
+        None => None,
     };
     let mut scene = match given {
         Some(scene) => look::restyled(options, scene, map)?,
@@ -318,6 +329,14 @@ fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut Steps) -> R
         None => scene.background,
     };
     let legend = if solid { None } else { Legend::new(&scalars, &field, &scene.transfer, options.log) };
+    if let Some(whole) = whole {
+        if options.nan_color.is_some() {
+            bail!(
+                "--nan-color: values that are missing in a regular or rectilinear grid have no colour of their own yet"
+            );
+        }
+        field = whole;
+    }
     if let (Some((color, opacity)), false) = (options.nan_color, solid) {
         let (transfer, blend) = (&scene.transfer, scene.blend);
         let shown = missing::shown(&mesh, &tetrahedra, &scalars, transfer, blend, color, opacity)?;
@@ -328,10 +347,18 @@ fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut Steps) -> R
             }
         }
     }
-    Ok(Job { mesh, tetrahedra, field, scene, legend, load_ms, split_ms })
+    Ok(Job { mesh, grid, tetrahedra, field, scene, legend, load_ms, split_ms })
 }
 
 impl Job {
+    /// The job, if it draws a mesh: `command` knows no grids.
+    pub(crate) fn of_mesh(self, command: &str) -> Result<Self> {
+        if self.grid.is_some() {
+            bail!("halite {command} is for meshes, and this is a regular or rectilinear grid");
+        }
+        Ok(self)
+    }
+
     /// What a legend tells.
     ///
     /// # Errors
@@ -501,14 +528,19 @@ pub(crate) struct Times {
 }
 
 pub(crate) fn draw(job: Job, renderer: &mut Renderer) -> Result<Drawn> {
-    let Job { mesh, tetrahedra, field, scene, load_ms, split_ms, .. } = job;
+    let Job { mesh, grid, tetrahedra, field, scene, load_ms, split_ms, .. } = job;
     let (view, behind) = scene.view()?;
-    renderer.check_room(mesh.points().len(), &tetrahedra)?;
-    progress::during("matching faces", |p| renderer.set_mesh_with_progress(&mesh, tetrahedra, p));
+    match &grid {
+        Some(grid) => renderer.set_grid(grid)?,
+        None => {
+            renderer.check_room(mesh.points().len(), &tetrahedra)?;
+            progress::during("matching faces", |p| renderer.set_mesh_with_progress(&mesh, tetrahedra, p));
+        }
+    }
     renderer.set_field(&field)?;
     renderer.set_transfer(&scene.transfer);
     // The renderer has its own copy, and the meshes that people draw are large.
-    drop((mesh, field));
+    drop((mesh, grid, field));
     let start = Instant::now();
     let image = progress::during("drawing", |p| renderer.render(&view, p))?;
     let times = Times { load: load_ms, split: split_ms, first_frame: ms(start), transfer_edit: None };
