@@ -7,12 +7,15 @@
 //! Blocks of voxels that the function makes empty are passed without a look at their values (`volume`).
 //!
 //! It is the exact counterpart of the ray caster of El Hajjar, Marchesin, Dischler & Mongenet (Second Order Pre-integrated
-//! Volume Rendering, 2008), which follows such a field by quadratic polynomials. It runs on the CPU.
+//! Volume Rendering, 2008), which follows such a field by quadratic polynomials: their orders are there by name
+//! ([`Reconstruction`]). It runs on the CPU.
 
 mod cubic;
 mod piece;
 mod ray;
+pub(crate) mod reconstruction;
 mod volume;
 
 pub(crate) use ray::{Frame, render};
+pub use reconstruction::{Order, Reconstruction, Sampling};
 pub(crate) use volume::{Samples, Volume};

@@ -17,7 +17,7 @@
 //! feature `ffi` it opens to C++. [`scene`] describes a picture in a JSON file, and
 //! [`mod@reference`] is the slow float64 second opinion that the tests judge the engines by.
 
-pub(crate) mod cast;
+pub mod cast;
 pub mod cell;
 pub mod error;
 #[cfg(feature = "ffi")]

@@ -6,6 +6,7 @@ mod prepared;
 mod stats;
 mod tables;
 
+use crate::cast::Reconstruction;
 use crate::error::{Error, Result};
 use crate::field::Field;
 use crate::geometry::Geometry;
@@ -56,6 +57,7 @@ pub struct Renderer {
     mesh: Option<Loaded>,
     /// The grid that is drawn, in place of a mesh.
     grid: Option<LoadedGrid>,
+    reconstruction: Reconstruction,
     field: Option<Prepared>,
     transfer: Option<TransferFunction>,
     exact: Option<Exact<f32>>,
@@ -174,6 +176,7 @@ impl Renderer {
             switches: Switches::default(),
             mesh: None,
             grid: None,
+            reconstruction: Reconstruction::default(),
             field: None,
             transfer: None,
             exact: None,

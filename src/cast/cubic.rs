@@ -5,6 +5,14 @@
 //! the eight corners of the box that p and q span. Nothing cancels, and the least and the greatest coefficient bound the
 //! cubic.
 
+/// The trilinear function with these values at the corners of the unit cube, at `p`.
+#[inline(always)]
+pub(super) fn trilinear(corners: &[f64; 8], p: [f64; 3]) -> f64 {
+    let mix = |a: f64, b: f64, w: f64| a + (b - a) * w;
+    let x = [0, 2, 4, 6].map(|i| mix(corners[i], corners[i + 1], p[0]));
+    mix(mix(x[0], x[1], p[1]), mix(x[2], x[3], p[1]), p[2])
+}
+
 /// A cubic over [0, 1] by its Bernstein coefficients.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Cubic(pub(super) [f64; 4]);
@@ -108,7 +116,7 @@ mod tests {
         (*seed >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    fn trilinear(c: &[f64; 8], [x, y, z]: [f64; 3]) -> f64 {
+    fn by_weights(c: &[f64; 8], [x, y, z]: [f64; 3]) -> f64 {
         let weight = |k: usize, i: usize, w: f64| if i >> k & 1 == 1 { w } else { 1.0 - w };
         (0..8).map(|i| c[i] * weight(0, i, x) * weight(1, i, y) * weight(2, i, z)).sum()
     }
@@ -120,11 +128,12 @@ mod tests {
             let corners: [f64; 8] = std::array::from_fn(|_| random(&mut seed) * 2.0 - 1.0);
             let [p, q]: [[f64; 3]; 2] = std::array::from_fn(|_| std::array::from_fn(|_| random(&mut seed)));
             let cubic = Cubic::along(&corners, p, q);
+            assert!((trilinear(&corners, p) - by_weights(&corners, p)).abs() < 1e-15 * 8.0);
             let [low, high] = cubic.bounds();
             let part = cubic.part(0.25, 0.75);
             for i in 0..=20 {
                 let u = f64::from(i) / 20.0;
-                let at = |u: f64| trilinear(&corners, [0, 1, 2].map(|k| p[k] + (q[k] - p[k]) * u));
+                let at = |u: f64| by_weights(&corners, [0, 1, 2].map(|k| p[k] + (q[k] - p[k]) * u));
                 assert!((cubic.at(u) - at(u)).abs() < 1e-15 * 8.0);
                 assert!((part.at(u) - at(0.25 + 0.5 * u)).abs() < 1e-15 * 8.0);
                 assert!(cubic.at(u) >= low - 1e-15 && cubic.at(u) <= high + 1e-15);

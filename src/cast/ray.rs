@@ -1,7 +1,8 @@
 //! Rays: from voxel to voxel, and what each adds.
 
-use super::cubic::Cubic;
+use super::cubic::{Cubic, trilinear};
 use super::piece::Piece;
+use super::reconstruction::{Order, Reconstruction, Sampling};
 use super::volume::{Samples, Volume};
 use crate::integral::{Exact, Knots, Light};
 use crate::view::{Blend, View};
@@ -24,6 +25,7 @@ pub(crate) struct Frame<'a> {
     pub(crate) volume: &'a Volume,
     pub(crate) samples: &'a Samples,
     pub(crate) exact: &'a Exact<f64>,
+    pub(crate) reconstruction: Reconstruction,
     pub(crate) view: &'a View,
     /// Turns the largest values along a ray, normalised, into a premultiplied colour for [`Blend::Maximum`].
     pub(crate) pixel: &'a (dyn Fn(&[f64]) -> [f32; 4] + Sync),
@@ -117,7 +119,7 @@ impl<'a, const N: usize> Caster<'a, N> {
 
     /// Follows the ray of pixel (`i`, `j`).
     fn trace(&self, i: u32, j: u32) -> Gathered<N> {
-        let Volume { axes, inverse, cells, to_axes, centre, scale, .. } = self.frame.volume;
+        let Volume { axes, cells, to_axes, centre, scale, .. } = self.frame.volume;
         let mut gathered = Gathered { light: Light::none(), largest: None, steps: 0 };
         let ray = self.frame.view.ray(i, j);
         // From the point of the ray that is nearest to the middle of the grid, so that no distance is great.
@@ -141,10 +143,13 @@ impl<'a, const N: usize> Caster<'a, N> {
         if t >= end {
             return gathered;
         }
-        let mut at = [0, 1, 2].map(|a| {
-            let x = o[a] + d[a] * t;
-            (axes[a].partition_point(|c| *c <= x).max(1) - 1).min(cells[a] - 1)
-        });
+        if let Reconstruction { order, sampling: Sampling::Steps(step) } = self.frame.reconstruction
+            && order != Order::Exact
+        {
+            self.march(&Line { o, d }, [t, end], step, &mut gathered);
+            return gathered;
+        }
+        let mut at = Line { o, d }.voxel(self.frame.volume, t);
         // The plane of each axis that comes next, and where.
         let plane = |a: usize, at: usize| if d[a] > 0.0 { at + 1 } else { at };
         let crossing =
@@ -156,11 +161,7 @@ impl<'a, const N: usize> Caster<'a, N> {
             if to > t {
                 gathered.steps += 1;
                 if self.seen[self.frame.samples.block(at)] {
-                    let place = |t: f64| {
-                        DVec3::from_array(
-                            [0, 1, 2].map(|a| ((o[a] + d[a] * t - axes[a][at[a]]) * inverse[a][at[a]]).clamp(0.0, 1.0)),
-                        )
-                    };
+                    let place = |t: f64| Line { o, d }.place(self.frame.volume, at, t);
                     self.voxel(at, place(t), place(to), (to - t) * scale, &mut gathered);
                     if gathered.light.through < least_light(self.frame.exact.direct) {
                         return gathered;
@@ -188,13 +189,60 @@ impl<'a, const N: usize> Caster<'a, N> {
         if volume.is_hidden(c) {
             return;
         }
-        let cubic = |k: usize| {
+        let cubics: [Cubic; N] = std::array::from_fn(|k| {
             if samples.of_cells {
                 return Cubic::constant(samples.of_cell(c, k));
             }
             Cubic::along(&samples.corners(at, k), p.to_array(), q.to_array())
-        };
-        let last = cubic(N - 1);
+        });
+        match self.frame.reconstruction.order {
+            Order::Exact => self.add(&cubics, length, gathered),
+            order => self.slab(order, &cubics.map(|c| [c.0[0], c.at(0.5), c.0[3]]), length, gathered),
+        }
+    }
+
+    /// Follows a ray in equal steps between two places of it.
+    fn march(&self, line: &Line, [mut t, end]: [f64; 2], step: f64, gathered: &mut Gathered<N>) {
+        let mut front = self.sample(line, t);
+        while t < end {
+            let to = (t + 2.0 * step).min(end);
+            let (middle, back) = (self.sample(line, f64::midpoint(t, to)), self.sample(line, to));
+            let samples = std::array::from_fn(|k| [front[k], middle[k], back[k]]);
+            self.slab(self.frame.reconstruction.order, &samples, (to - t) * self.frame.volume.scale, gathered);
+            gathered.steps += 1;
+            if gathered.light.through < least_light(self.frame.exact.direct) || to <= t {
+                return;
+            }
+            (t, front) = (to, back);
+        }
+    }
+
+    /// The field at a place of a ray; NaN where it is left out.
+    fn sample(&self, line: &Line, t: f64) -> [f64; N] {
+        let Frame { volume, samples, .. } = self.frame;
+        let at = line.voxel(volume, t);
+        let c = (at[2] * volume.cells[1] + at[1]) * volume.cells[0] + at[0];
+        if volume.is_hidden(c) {
+            return [f64::NAN; N];
+        }
+        let p = line.place(volume, at, t);
+        std::array::from_fn(|k| {
+            if samples.of_cells { samples.of_cell(c, k) } else { trilinear(&samples.corners(at, k), p.to_array()) }
+        })
+    }
+
+    /// Adds what stands for the field between the samples of a slab.
+    fn slab(&self, order: Order, samples: &[[f64; 3]; N], length: f64, gathered: &mut Gathered<N>) {
+        for part in 0..order.parts() {
+            let cubics = samples.map(|s| order.part(part, s));
+            self.add(&cubics, length / order.parts() as f64, gathered);
+        }
+    }
+
+    /// Adds a stretch of `length` along which the values are these cubics.
+    #[inline(always)]
+    fn add(&self, cubics: &[Cubic; N], length: f64, gathered: &mut Gathered<N>) {
+        let last = &cubics[N - 1];
         let [low, high] = last.bounds();
         // A value that is not finite makes all of it so.
         if !(low.is_finite() && high.is_finite()) {
@@ -202,7 +250,7 @@ impl<'a, const N: usize> Caster<'a, N> {
         }
         if self.frame.view.blend() == Blend::Maximum {
             if gathered.largest.is_none_or(|l| high > l[N - 1]) {
-                self.raise(&last, cubic, gathered);
+                raise(cubics, &mut gathered.largest);
             }
             return;
         }
@@ -211,22 +259,9 @@ impl<'a, const N: usize> Caster<'a, N> {
             return;
         }
         if N == 1 {
-            self.scalar(&last, intervals, length, &mut gathered.light);
+            self.scalar(last, intervals, length, &mut gathered.light);
         } else {
-            let all: [Cubic; N] = std::array::from_fn(|k| if k == N - 1 { last } else { cubic(k) });
-            self.several(&all, length, &mut gathered.light);
-        }
-    }
-
-    /// Takes the largest value of a voxel if it is larger than all before.
-    fn raise(&self, last: &Cubic, cubic: impl Fn(usize) -> Cubic, gathered: &mut Gathered<N>) {
-        let places = [0.0, 1.0].into_iter().chain(last.turns());
-        let Some(u) = places.max_by(|a, b| last.at(*a).total_cmp(&last.at(*b))) else { return };
-        if gathered.largest.is_none_or(|l| last.at(u) > l[N - 1]) {
-            let values = std::array::from_fn(|k| cubic(k).at(u));
-            if values.iter().all(|v| v.is_finite()) {
-                gathered.largest = Some(values);
-            }
+            self.several(cubics, length, &mut gathered.light);
         }
     }
 
@@ -314,6 +349,42 @@ impl<'a, const N: usize> Caster<'a, N> {
             let sum = Piece { depth, emission }.integrate(*direct);
             let factor = if *direct { length * share } else { 1.0 };
             light.add(sum.emitted.map(|e| e * factor), sum.alpha);
+        }
+    }
+}
+
+/// A ray o + t d in coordinates along the axes.
+struct Line {
+    o: [f64; 3],
+    d: [f64; 3],
+}
+
+impl Line {
+    /// The voxel at `t`, or the nearest to it.
+    fn voxel(&self, volume: &Volume, t: f64) -> [usize; 3] {
+        [0, 1, 2].map(|a| {
+            let x = self.o[a] + self.d[a] * t;
+            (volume.axes[a].partition_point(|c| *c <= x).max(1) - 1).min(volume.cells[a] - 1)
+        })
+    }
+
+    /// Where in the unit cube of a voxel it is at `t`.
+    #[inline(always)]
+    fn place(&self, volume: &Volume, at: [usize; 3], t: f64) -> DVec3 {
+        let along = |a: usize| (self.o[a] + self.d[a] * t - volume.axes[a][at[a]]) * volume.inverse[a][at[a]];
+        DVec3::from_array([0, 1, 2].map(|a| along(a).clamp(0.0, 1.0)))
+    }
+}
+
+/// Takes the largest value of the last of these cubics, and the others there, if it is larger than all before.
+fn raise<const N: usize>(cubics: &[Cubic; N], largest: &mut Option<[f64; N]>) {
+    let last = &cubics[N - 1];
+    let places = [0.0, 1.0].into_iter().chain(last.turns());
+    let Some(u) = places.max_by(|a, b| last.at(*a).total_cmp(&last.at(*b))) else { return };
+    if largest.is_none_or(|l| last.at(u) > l[N - 1]) {
+        let values = cubics.map(|c| c.at(u));
+        if values.iter().all(|v| v.is_finite()) {
+            *largest = Some(values);
         }
     }
 }

@@ -26,6 +26,8 @@ pub(crate) struct Volume {
     pub(super) centre: DVec3,
     /// What lengths in the world are multiplied by; a power of two.
     pub(crate) scale: f64,
+    /// From corner to corner, in world units.
+    diagonal: f64,
     /// A bit for each voxel that is left out; none if none is.
     hidden: Option<Vec<u64>>,
 }
@@ -60,13 +62,19 @@ impl Volume {
         {
             return Err(Error::Empty("all of its cells are ghosts or hidden".into()));
         }
-        Ok(Volume { axes, inverse, cells: grid.cells(), to_axes, centre, scale, hidden })
+        let diagonal = 2.0 * extent;
+        Ok(Volume { axes, inverse, cells: grid.cells(), to_axes, centre, scale, diagonal, hidden })
     }
 
     /// Whether voxel `c` is left out.
     #[inline(always)]
     pub(super) fn is_hidden(&self, c: usize) -> bool {
         self.hidden.as_ref().is_some_and(|bits| bits[c / 64] >> (c % 64) & 1 == 1)
+    }
+
+    /// From corner to corner, in world units.
+    pub(crate) fn diagonal(&self) -> f64 {
+        self.diagonal
     }
 
     /// Number of voxels.

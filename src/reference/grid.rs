@@ -11,7 +11,7 @@ use crate::view::View;
 use glam::{DMat3, DVec3};
 
 /// Pieces of the part of a ray inside a voxel: a line is off by their square over 8 times the second derivative.
-const PIECES: usize = 256;
+const PIECES: usize = 1024;
 
 /// The voxels of a grid that are drawn.
 #[derive(Debug)]

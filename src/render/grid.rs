@@ -1,7 +1,7 @@
 //! Frames of regular and rectilinear grids: by the ray caster, on the CPU, whatever the renderer's engine and device are.
 
 use super::{Progress, Renderer, ms};
-use crate::cast::{self, Samples, Volume};
+use crate::cast::{self, Reconstruction, Samples, Volume};
 use crate::error::{Error, Result};
 use crate::field::{Field, Kind, Normal};
 use crate::gpu::Part;
@@ -73,6 +73,11 @@ impl Renderer {
         Ok(())
     }
 
+    /// Rebuilds the field of a grid another way along rays from now on; nothing to meshes.
+    pub fn set_reconstruction(&mut self, reconstruction: Reconstruction) {
+        self.reconstruction = reconstruction;
+    }
+
     /// What draws grids.
     pub(super) fn name_caster(&mut self) {
         self.stats.engine = "grid".into();
@@ -100,17 +105,27 @@ impl Renderer {
             let form = self.integral.form.name();
             return Err(Error::Render(format!("grids have the exact integral, not {form}: --integral exact")));
         }
+        let reconstruction = self.reconstruction;
         let grid = self.grid.as_mut().ok_or_else(|| missing("grid"))?;
         let field = grid.field.as_mut().ok_or_else(|| missing("field"))?;
         let transfer = self.transfer.as_ref().ok_or_else(|| missing("transfer function"))?;
         let (kind, normal, scale) = (field.kind, field.normal, grid.volume.scale);
+        reconstruction.check(grid.volume.diagonal())?;
         if field.exact.is_none() {
             field.exact = Some(Exact::new(transfer, kind, &normal, scale));
         }
         let field = &*field;
         let exact = field.exact.as_ref().ok_or_else(|| missing("transfer function"))?;
         let pixel = |v: &[f64]| field.largest(transfer, v);
-        let frame = cast::Frame { volume: &grid.volume, samples: &field.samples, exact, view, pixel: &pixel, progress };
+        let frame = cast::Frame {
+            volume: &grid.volume,
+            samples: &field.samples,
+            exact,
+            reconstruction,
+            view,
+            pixel: &pixel,
+            progress,
+        };
         let (pixels, steps) = self.pool.install(|| cast::render(&frame));
         let stats = &mut self.stats;
         (stats.steps, stats.repaired_rays, stats.cpu_rays) = (steps, 0, 0);

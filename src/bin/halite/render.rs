@@ -3,6 +3,7 @@ use crate::{camera, input, integral, look, output, parse, progress, variant};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
+use halite::cast::{Order, Reconstruction, Sampling};
 use halite::field::{Association, Component, Field, Kind};
 use halite::gpu::DeviceChoice;
 use halite::grid::Grid;
@@ -55,6 +56,13 @@ pub(crate) struct Request {
     /// Width and height in pixels [default: the scene's, or 1024x768]
     #[arg(long, value_name = "WxH", value_parser = parse::size)]
     size: Option<[u32; 2]>,
+    /// What stands for the field of a regular or rectilinear grid between samples: itself, parabolas, lines, or rectangles
+    /// by the middle, the left or the right sample [default: exact]
+    #[arg(long, value_name = "ORDER", value_parser = parse::order)]
+    reconstruction: Option<Order>,
+    /// Where such samples are: at faces of voxels and midway, or so many world units apart [default: voxels]
+    #[arg(long, value_name = "voxels|LENGTH", value_parser = parse::sampling, requires = "reconstruction")]
+    sampling: Option<Sampling>,
     /// Stretch the mesh, such as 1,1,50 to exaggerate heights; lengths are as they are seen then
     #[arg(long, value_name = "X,Y,Z", value_parser = parse::factors, allow_hyphen_values = true)]
     scale: Option<DVec3>,
@@ -261,6 +269,9 @@ fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut Steps) -> R
     let start = Instant::now();
     let path = given.as_ref().map_or(options.input.clone(), |scene| scene.mesh.clone());
     let (mut mesh, mut grid) = input::mesh(&path, steps.time)?;
+    if grid.is_none() && options.reconstruction.is_some() {
+        bail!("{}: --reconstruction is for regular and rectilinear grids, and this is a mesh", path.display());
+    }
     if let Some(by) = options.scale {
         mesh = mesh.scaled(by).with_context(|| path.display().to_string())?;
         grid = grid.map(|grid| grid.scaled(by)).transpose()?;
@@ -407,6 +418,13 @@ impl Request {
         }
         let engine = engine.into();
         let mut renderer = Renderer::with_engine(threads, device, engine)?;
+        let (order, sampling) = (self.reconstruction.unwrap_or_default(), self.sampling.unwrap_or_default());
+        if order == Order::Exact && sampling != Sampling::Voxels {
+            return Err(output::misuse(
+                "--sampling: the exact reconstruction takes no samples; --reconstruction 2 does",
+            ));
+        }
+        renderer.set_reconstruction(Reconstruction { order, sampling });
         let switches = scene.map_or(Ok(Switches::default()), |s| variant::of_scene(s, &self.input))?;
         renderer.set_switches(self.variant.apply(switches));
         renderer.set_integral(self.choice(scene)?);
