@@ -2,11 +2,14 @@
 
 mod answer;
 mod backend;
+mod frame;
+mod grid;
 mod loaded;
 mod prepared;
 mod stats;
 mod tables;
 
+use crate::cast::Reconstruction;
 use crate::error::{Error, Result};
 use crate::field::Field;
 use crate::geometry::Geometry;
@@ -14,7 +17,7 @@ use crate::gpu::Part;
 use crate::gpu::table::builds;
 use crate::gpu::{DeviceChoice, Gpu};
 use crate::image::Image;
-use crate::integral::{Choice, Exact, Form, Lookup, lookup};
+use crate::integral::{Choice, Exact, Form, lookup};
 use crate::memory;
 use crate::mesh::Mesh;
 use crate::mesh::cells::Tetrahedra;
@@ -23,7 +26,9 @@ use crate::transfer::TransferFunction;
 use crate::view::{Blend, View};
 pub use answer::Answer;
 use backend::{Backend, Drawn};
+use frame::Frame;
 use glam::DVec3;
+use grid::LoadedGrid;
 use loaded::Loaded;
 use prepared::{AnyValues, Prepared};
 pub use stats::{ProjectionStats, Stats, SweepStats};
@@ -55,6 +60,9 @@ pub struct Renderer {
     backend: Backend,
     switches: Switches,
     mesh: Option<Loaded>,
+    /// The grid that is drawn, in place of a mesh.
+    grid: Option<LoadedGrid>,
+    reconstruction: Reconstruction,
     field: Option<Prepared>,
     transfer: Option<TransferFunction>,
     exact: Option<Exact<f32>>,
@@ -110,6 +118,8 @@ impl Renderer {
             backend,
             switches: Switches::default(),
             mesh: None,
+            grid: None,
+            reconstruction: Reconstruction::default(),
             field: None,
             transfer: None,
             exact: None,
@@ -132,6 +142,9 @@ impl Renderer {
     fn name_device(&mut self) {
         // Whether tables are built on the device depends on it.
         self.key = None;
+        if self.grid.is_some() {
+            return self.name_caster();
+        }
         let walks = self.mesh.as_ref().is_some_and(|m| m.left_to_walk);
         self.stats.engine = if walks { Backend::without_device().engine() } else { self.backend.engine() }.into();
         if walks && self.backend.gpu().is_some() && self.stats.device != "cpu" {
@@ -196,6 +209,7 @@ impl Renderer {
         tetrahedra: Tetrahedra,
         report: &(dyn Fn(f64) + Sync),
     ) {
+        self.grid = None;
         let start = Instant::now();
         let needs = self.backend.needs();
         let mesh = self.pool.install(|| Loaded::new(points, cells, tetrahedra, needs, report));
@@ -257,11 +271,14 @@ impl Renderer {
         Ok(())
     }
 
-    /// Draws another field of the mesh from now on.
+    /// Draws another field of the mesh, or grid, from now on.
     ///
     /// # Errors
-    /// [`Error::Render`] if there is no mesh; [`Error::Field`] if the field does not fit it.
+    /// [`Error::Render`] if there is neither; [`Error::Field`] if the field does not fit it.
     pub fn set_field(&mut self, field: &Field) -> Result<()> {
+        if self.grid.is_some() {
+            return self.set_grid_field(field);
+        }
         let start = Instant::now();
         let mesh = self.mesh.as_ref().ok_or_else(|| Error::Render("a field needs a mesh first".into()))?;
         let tables = self.integral.form != Form::Exact;
@@ -278,6 +295,9 @@ impl Renderer {
     /// Draws with another transfer function from now on.
     pub fn set_transfer(&mut self, transfer: &TransferFunction) {
         self.transfer = Some(transfer.clone());
+        if let Some(grid) = &mut self.grid {
+            grid.forget_function();
+        }
         self.forget(Part::Function);
     }
 
@@ -365,6 +385,9 @@ impl Renderer {
     }
 
     fn try_render(&mut self, view: &View, progress: &Progress) -> Result<Image> {
+        if self.grid.is_some() {
+            return self.cast(view, progress);
+        }
         let start = Instant::now();
         let missing = |what: &str| Error::Render(format!("there is no {what} to draw"));
         let walks = self.mesh.as_ref().is_some_and(|m| m.left_to_walk);
@@ -465,29 +488,6 @@ impl Renderer {
     /// What the last calls did.
     pub fn stats(&self) -> &Stats {
         &self.stats
-    }
-}
-
-/// Everything that a frame depends on.
-struct Frame<'a> {
-    mesh: &'a Loaded,
-    field: &'a Prepared,
-    transfer: &'a TransferFunction,
-    exact: &'a Exact<f32>,
-    table: Option<&'a Arc<Lookup>>,
-    view: &'a View,
-    switches: &'a Switches,
-    progress: &'a Progress<'a>,
-}
-
-impl Frame<'_> {
-    /// The pixel of a ray whose largest values are `v`: colour and opacity there, premultiplied.
-    fn largest<const N: usize>(&self, v: &[f32; N]) -> [f32; 4] {
-        let own = |k: usize| self.field.normal()[k].invert(f64::from(v[k]));
-        let [r, g, b] =
-            if N == 4 { [own(0), own(1), own(2)].map(|c| c.clamp(0.0, 1.0)) } else { self.transfer.color_at(own(0)) };
-        let a = self.transfer.opacity_at(own(N - 1)).min(1.0);
-        [r * a, g * a, b * a, a].map(|c| c as f32)
     }
 }
 

@@ -1,7 +1,7 @@
 //! What draws a renderer's frames: one variant for each engine and where it runs. An engine is added by a variant here, and by
 //! what it does in each of these methods.
 
-use super::Frame;
+use super::frame::Frame;
 use super::stats::{ProjectionStats, SweepStats};
 use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Values};

@@ -26,14 +26,19 @@ pub(crate) struct Times {
 }
 
 pub(crate) fn draw(job: Job, renderer: &mut Renderer) -> Result<Drawn> {
-    let Job { mesh, tetrahedra, field, scene, load_ms, split_ms, .. } = job;
+    let Job { mesh, grid, tetrahedra, field, scene, load_ms, split_ms, .. } = job;
     let (view, behind) = scene.view()?;
-    renderer.check_room(mesh.points().len(), &tetrahedra)?;
-    progress::during("matching faces", |p| renderer.set_mesh_with_progress(&mesh, tetrahedra, p));
+    match &grid {
+        Some(grid) => renderer.set_grid(grid)?,
+        None => {
+            renderer.check_room(mesh.points().len(), &tetrahedra)?;
+            progress::during("matching faces", |p| renderer.set_mesh_with_progress(&mesh, tetrahedra, p));
+        }
+    }
     renderer.set_field(&field)?;
     renderer.set_transfer(&scene.transfer);
     // The renderer has its own copy, and the meshes that people draw are large.
-    drop((mesh, field));
+    drop((mesh, grid, field));
     let start = Instant::now();
     let image = progress::during("drawing", |p| renderer.render(&view, p))?;
     let times = Times { load: load_ms, split: split_ms, first_frame: ms(start), transfer_edit: None };
