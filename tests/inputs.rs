@@ -236,3 +236,26 @@ fn cases_of_users() {
         assert!(err.contains("POINT_DATA has 26 tuples where there are 27 points"), "{err}");
     }
 }
+
+/// What `examples/` shows draws pictures; cargo builds it with all tests.
+#[test]
+fn examples_draw() {
+    let built = std::env::current_exe().unwrap().ancestors().nth(2).unwrap().join("examples");
+    let place = TempDir::new().unwrap();
+    let folder = place.path();
+    std::fs::write(folder.join("a.vtu"), cube(1.0, "0")).unwrap();
+    for (name, arguments) in [("file_to_png", &["a.vtu", "a.png"][..]), ("mesh_from_arrays", &["b.png"])] {
+        let program = built.join(name);
+        if !program.exists() {
+            eprintln!("skipped in part: there is no {}", program.display());
+            continue;
+        }
+        let mut command = Command::new(program);
+        let output = command.current_dir(folder).args(arguments).env("HALITE_DEVICE", "cpu").output().unwrap();
+        assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
+        let picture = image::open(folder.join(arguments[arguments.len() - 1])).unwrap().into_rgb8();
+        let differ = picture.pixels().filter(|p| *p != picture.get_pixel(0, 0)).count();
+        assert!(differ > 10_000, "{name}: {differ} pixels show something");
+        assert!(!Command::new(built.join(name)).output().unwrap().status.success(), "{name} without arguments");
+    }
+}
