@@ -57,6 +57,28 @@ impl Values {
         self.len() == 0
     }
 
+    /// The tuples of `components` values with the numbers `at`, one after another, in the same type; zeros where there is
+    /// no such tuple.
+    pub(crate) fn gathered(&self, components: usize, at: &[usize]) -> Values {
+        macro_rules! gather {
+            ($($variant:ident),*) => {
+                match self {
+                    $(Values::$variant(v) => {
+                        let mut all = Vec::with_capacity(at.len() * components);
+                        for t in at {
+                            match v.chunks_exact(components).nth(*t) {
+                                Some(tuple) => all.extend_from_slice(tuple),
+                                None => all.resize(all.len() + components, Default::default()),
+                            }
+                        }
+                        Values::$variant(all)
+                    })*
+                }
+            };
+        }
+        gather!(I8, U8, I16, U16, I32, U32, I64, U64, F32, F64)
+    }
+
     /// Value `i` as f64.
     ///
     /// # Panics
@@ -84,6 +106,46 @@ impl Array {
         self.values.len() / self.components.max(1)
     }
 }
+
+/// What has arrays of points and of cells: a [`Mesh`], or a [`crate::grid::Grid`].
+pub trait Arrays {
+    /// Number of cells of all types.
+    fn cell_count(&self) -> usize;
+    /// The arrays with a value for each point.
+    fn point_arrays(&self) -> &[Array];
+    /// The arrays with a value for each cell.
+    fn cell_arrays(&self) -> &[Array];
+    /// What is known of the arrays of points beside their values.
+    fn point_attributes(&self) -> &Attributes;
+    /// What is known of the arrays of cells beside their values.
+    fn cell_attributes(&self) -> &Attributes;
+}
+
+/// Implements [`Arrays`] by methods of the same names.
+macro_rules! has_arrays {
+    ($type:ty) => {
+        impl $crate::mesh::Arrays for $type {
+            fn cell_count(&self) -> usize {
+                self.cell_count()
+            }
+            fn point_arrays(&self) -> &[$crate::mesh::Array] {
+                self.point_arrays()
+            }
+            fn cell_arrays(&self) -> &[$crate::mesh::Array] {
+                self.cell_arrays()
+            }
+            fn point_attributes(&self) -> &$crate::mesh::Attributes {
+                self.point_attributes()
+            }
+            fn cell_attributes(&self) -> &$crate::mesh::Attributes {
+                self.cell_attributes()
+            }
+        }
+    };
+}
+pub(crate) use has_arrays;
+
+has_arrays!(Mesh);
 
 /// The cells of a mesh, as VTK lays them out.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -284,6 +346,16 @@ impl Mesh {
         Ok(self)
     }
 
+    /// Bytes that its points, cells and arrays take.
+    pub(crate) fn bytes(&self) -> u64 {
+        let values = |array: &Array| with_values!(&array.values, v => size_of_val(&**v));
+        let arrays: usize = self.point_arrays.iter().chain(&self.cell_arrays).map(values).sum();
+        let Cells { types, offsets, connectivity } = &self.cells;
+        let cells = size_of_val(&**types) + size_of_val(&**offsets) + size_of_val(&**connectivity);
+        let faces = |p: &Polyhedra| size_of_val(&*p.cells) + size_of_val(&*p.faces) + size_of_val(&*p.points);
+        (size_of_val(&*self.points) + arrays + cells + self.polyhedra.as_ref().map_or(0, faces)) as u64
+    }
+
     /// The points, in world coordinates.
     pub fn points(&self) -> &[DVec3] {
         &self.points
@@ -292,6 +364,11 @@ impl Mesh {
     /// The cells, of every type that the file has.
     pub fn cells(&self) -> &Cells {
         &self.cells
+    }
+
+    /// Number of cells of all types.
+    pub fn cell_count(&self) -> usize {
+        self.cells.len()
     }
 
     /// The faces of its polyhedra.
@@ -320,7 +397,8 @@ impl Mesh {
     }
 }
 
-fn check_array(kind: &str, a: &Array, count: usize) -> Result<()> {
+/// Checks that an array of points or cells, which `kind` says, has values for `count` of them.
+pub(crate) fn check_array(kind: &str, a: &Array, count: usize) -> Result<()> {
     if a.components > 0 && count.checked_mul(a.components) == Some(a.values.len()) {
         return Ok(());
     }

@@ -8,18 +8,21 @@
 mod data;
 mod parsed;
 mod scan;
+mod structured;
 
 use super::input::Input;
 use super::vtu::renumber;
-use super::{MOST_WARNINGS, refuse, validated, warn_of_left_out};
+use super::{DataSet, MOST_WARNINGS, refuse, validated, warn_of_left_out};
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::mesh::{Array, Attributes, Cells, Mesh, POLYHEDRON, Polyhedra, Values};
 use glam::DVec3;
 use scan::{Fault, Scanner, Type};
 use std::path::Path;
+use structured::{Axes, Kind};
 
-/// Reads the unstructured grid in a legacy file.
-pub(super) fn read(input: &Input) -> Result<Mesh> {
+/// Reads the grid in a legacy file.
+pub(super) fn read(input: &Input) -> Result<DataSet> {
     let path = &input.path;
     let bytes = input.bytes().map_err(|e| Error::file(path, e))?;
     let mut scanner = Scanner::new(&bytes);
@@ -38,18 +41,24 @@ pub(super) fn read(input: &Input) -> Result<Mesh> {
     let kind = if scanner.pass("DATASET") { scanner.word("the kind of data set").ok() } else { None };
     match kind.map(|kind| kind.to_ascii_uppercase()).as_deref() {
         Some("UNSTRUCTURED_GRID") => {}
-        Some("STRUCTURED_POINTS") => return Err(refuse(path, "ImageData")),
-        Some("STRUCTURED_GRID") => return Err(refuse(path, "StructuredGrid")),
-        Some("RECTILINEAR_GRID") => return Err(refuse(path, "RectilinearGrid")),
+        Some("STRUCTURED_POINTS") => return structured::read(path, &mut scanner, Kind::Image),
+        Some("STRUCTURED_GRID") => return structured::read(path, &mut scanner, Kind::Structured),
+        Some("RECTILINEAR_GRID") => return structured::read(path, &mut scanner, Kind::Rectilinear),
         Some("POLYDATA") => return Err(refuse(path, "PolyData")),
         Some(other) => return Err(refuse(path, other)),
         None => return Err(Error::malformed(path, "there is no data set in it")),
     }
     let mut parts = Parts::default();
-    if let Err(what) = parts.scan(&mut scanner) {
+    let scanned = parts.scan(&mut scanner);
+    if let Some(error) = scanner.lacking {
+        return Err(error);
+    }
+    if let Err(what) = scanned {
+        // Its numbers once as they are, and once as they are kept.
+        memory::check_array::<u8>("another reading of the file", 2 * bytes.len())?;
         parts = Parts::parsed(&bytes).ok_or_else(|| Error::malformed(path, what))?;
     }
-    parts.mesh(path, version)
+    parts.mesh(path, version).map(DataSet::Mesh)
 }
 
 /// What was read so far.
@@ -68,6 +77,8 @@ struct Parts {
     counts: Vec<(usize, usize)>,
     /// What else was passed over.
     notes: Vec<String>,
+    /// What a grid that lists no cells says of its axes.
+    axes: Option<Axes>,
 }
 
 /// What the sections are called that have data of points (0) and of cells (1).
@@ -97,6 +108,9 @@ impl Parts {
                         return Ok(());
                     }
                 }
+                _ if self.axes.as_mut().is_some_and(|axes| axes.has(&keyword)) => {
+                    self.axis(from, &keyword).map_err(named)?;
+                }
                 _ => self.data(from, &keyword, at),
             }
             from.pass_metadata();
@@ -110,6 +124,7 @@ impl Parts {
                 let count = from.count("the number of points")?;
                 let kind = Type::from_name(&from.word("their type")?, from.binary)?;
                 let values = from.values(kind, count.checked_mul(3))?.ok_or("they are strings")?;
+                from.had(memory::check_array::<DVec3>("its points", count))?;
                 let coordinate = |i| values.get(i);
                 let point = |p: usize| DVec3::from_array([0, 1, 2].map(|i| coordinate(3 * p + i)));
                 self.points = Some((0..count).map(point).collect());
@@ -118,7 +133,9 @@ impl Parts {
             _ => {
                 let count = from.count("the number of cells")?;
                 from.enter_numbers();
-                let types = from.numbers::<i32>(count)?.into_iter().enumerate();
+                let types = from.numbers::<i32>(count)?;
+                from.had(memory::check_array::<u8>("the types of its cells", count))?;
+                let types = types.into_iter().enumerate();
                 let narrow = |(c, kind)| u8::try_from(kind).map_err(|_| format!("the type of cell {c} is {kind}"));
                 self.types = Some(types.map(narrow).collect::<Result<_, _>>()?);
             }
@@ -138,6 +155,7 @@ impl Parts {
             from.enter_numbers();
             let list = from.numbers::<i32>(size)?;
             // What is negative is out of range in any case.
+            from.had(memory::check_array::<u32>("its cells", 2 * size + 2 * count))?;
             let list: Vec<u32> = list.into_iter().map(|n| u32::try_from(n).unwrap_or(u32::MAX)).collect();
             return self.unpack(&list, count);
         }
@@ -151,6 +169,7 @@ impl Parts {
         }
         let points = list(from, size)?;
         // Exact to 2^53; what is negative is out of range, as is what is larger.
+        from.had(memory::check_array::<u64>("its cells", offsets.len() + points.len() / 2))?;
         let index = |x: f64| if x < 0.0 { u64::MAX } else { x as u64 };
         self.offsets = Some((0..offsets.len()).map(|i| index(offsets.get(i))).collect());
         let point = |i| u32::try_from(index(points.get(i))).unwrap_or(u32::MAX);
@@ -161,7 +180,8 @@ impl Parts {
     /// Takes apart a list of cells: the number of points of each, and these.
     fn unpack(&mut self, list: &[u32], count: usize) -> Result<(), Fault> {
         let mut rest = list;
-        let mut offsets = vec![0];
+        let mut offsets = Vec::with_capacity(count.min(list.len()) + 1);
+        offsets.push(0);
         while let Some((own, after)) = rest.split_first() {
             let cell = offsets.len() - 1;
             let (points, after) = after
@@ -181,7 +201,10 @@ impl Parts {
 
     /// Says which section of data has not as many tuples as there are points or cells.
     fn wrong_count(&self) -> Option<String> {
-        let there = [self.points.as_ref().map(Vec::len), self.types.as_ref().map(Vec::len)];
+        let there = match &self.axes {
+            Some(axes) => axes.counts(),
+            None => [self.points.as_ref().map(Vec::len), self.types.as_ref().map(Vec::len)],
+        };
         let wrong = |(of, count): &&(usize, usize)| there[*of].is_some_and(|there| there != *count);
         let (of, count) = self.counts.iter().find(wrong)?;
         let (section, what) = (SECTIONS[*of], ["points", "cells"][*of]);
@@ -216,15 +239,19 @@ impl Parts {
         let mesh = Mesh::new(points, cells, of_points, of_cells);
         let mesh = mesh.and_then(|mesh| if let Some(p) = polyhedra { mesh.with_polyhedra(p) } else { Ok(mesh) });
         let mut mesh = validated(path, mesh)?;
-        let [mut of_points, mut of_cells] = self.attributes;
-        for note in self.notes.iter().take(MOST_WARNINGS) {
-            tracing::warn!("{}: {note}", path.display());
-        }
-        warn_of_left_out(path, &mut of_points.left_out);
-        warn_of_left_out(path, &mut of_cells.left_out);
+        let [of_points, of_cells] = told(path, self.attributes, &self.notes);
         mesh.set_attributes(of_points, of_cells);
         Ok(mesh)
     }
+}
+
+/// What is known of arrays, after the log has it.
+fn told(path: &Path, mut attributes: [Attributes; 2], notes: &[String]) -> [Attributes; 2] {
+    for note in notes.iter().take(MOST_WARNINGS) {
+        tracing::warn!("{}: {note}", path.display());
+    }
+    attributes.iter_mut().for_each(|known| warn_of_left_out(path, &mut known.left_out));
+    attributes
 }
 
 /// In these files a polyhedron has no points, but its faces: their number, and for each the number of its points, and

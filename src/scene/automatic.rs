@@ -12,7 +12,7 @@ pub use range::range;
 use super::{Scalars, Scene};
 use crate::error::Result;
 use crate::field::{Association, Component, Field};
-use crate::mesh::{Mesh, cells::Tetrahedra};
+use crate::mesh::{Arrays, Mesh, cells::Tetrahedra};
 use crate::transfer::Axis;
 use crate::transfer::colormap::ColorMap;
 use crate::view::{Blend, Camera};
@@ -32,6 +32,8 @@ const SOLID: [f64; 3] = [0.78, 0.82, 0.88];
 pub struct Wishes {
     /// The scalars that colours and opacities range over.
     pub range: Option<[f64; 2]>,
+    /// Smallest and largest value, where pictures of other meshes, such as those of other time steps, share the range.
+    pub values: Option<[f64; 2]>,
     /// The colours.
     pub map: Option<ColorMap>,
     /// The opacities.
@@ -98,14 +100,14 @@ pub fn scalars(mesh: &Mesh, of: Option<Association>) -> Result<Scalars> {
     Ok(scalars)
 }
 
-/// What a mesh without arrays is drawn as: one value everywhere, for a colour map of one colour.
+/// What a mesh, or a grid, without arrays is drawn as: one value everywhere, for a colour map of one colour.
 ///
 /// # Errors
 /// [`Error::Field`] if there is no cell.
 ///
 /// [`Error::Field`]: crate::Error::Field
-pub fn solid(mesh: &Mesh) -> Result<(Field, ColorMap)> {
-    let field = Field::from_slice("", &vec![0_u8; mesh.cells().len()], 1, Association::Cell, Component::Index(0))?;
+pub fn solid(mesh: &impl Arrays) -> Result<(Field, ColorMap)> {
+    let field = Field::from_slice("", &vec![0_u8; mesh.cell_count()], 1, Association::Cell, Component::Index(0))?;
     Ok((field, ColorMap::solid(SOLID)))
 }
 

@@ -77,7 +77,8 @@ impl Engine {
         let Scene { mesh, tetrahedra, field, transfer } = scene;
         match self {
             Engine::Twin { threads } => {
-                let mut renderer = Renderer::with_device(threads, DeviceChoice::Cpu).unwrap();
+                let walk = render::Engine::Traverse;
+                let mut renderer = Renderer::with_engine(threads, DeviceChoice::Cpu, walk).unwrap();
                 set(&mut renderer, scene);
                 views.iter().map(|view| renderer.render(view, &|_| ()).unwrap()).collect()
             }
@@ -112,7 +113,7 @@ pub(crate) fn on_device(engine: render::Engine) -> Option<Renderer> {
         Ok(renderer) => Some(renderer),
         Err(e) if std::env::var("HALITE_REQUIRE_GPU").is_ok_and(|v| v == "1") => panic!("{e}"),
         Err(e) => {
-            eprintln!("SKIPPED, as there is no device to test: {e}");
+            eprintln!("skipped: there is no device to test: {e}");
             None
         }
     }

@@ -1,4 +1,5 @@
-use crate::render::{self, Job, Request, Times, ms};
+use crate::drawn::{self, Times, ms};
+use crate::render::{self, Job, Request};
 use crate::{camera, output, progress};
 use anyhow::{Context, Result};
 use clap::Args;
@@ -65,7 +66,8 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     let first = measure(options, &job, &mut renderer)?;
     let mut runs = vec![first];
     drop(renderer);
-    if choice == DeviceChoice::Auto {
+    // Grids are drawn by the CPU on every device.
+    if choice == DeviceChoice::Auto && job.grid.is_none() {
         for other in others(&runs[0].stats) {
             let mut renderer = options.request.renderer(threads, scene.as_ref(), other)?;
             match measure(options, &job, &mut renderer) {
@@ -79,7 +81,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     output::print(&table(&runs, size))?;
     if let Some(path) = &options.json {
         let report = |r: &Run| {
-            let mut report = render::report(&r.stats, &r.times, size, r.frame_ms);
+            let mut report = drawn::report(&r.stats, &r.times, size, r.frame_ms);
             report["frame_cpu_ms"] = json!(r.frame_cpu_ms);
             report
         };
@@ -117,8 +119,12 @@ fn measure(options: &Options, job: &Job, renderer: &mut Renderer) -> Result<Run>
         Ok(scene.view()?.0)
     });
     let views: Vec<View> = views.collect::<Result<_>>()?;
-    renderer.check_room(job.mesh.points().len(), &job.tetrahedra)?;
-    progress::during("matching faces", |p| renderer.set_mesh_with_progress(&job.mesh, job.tetrahedra.clone(), p));
+    if let Some(grid) = &job.grid {
+        renderer.set_grid(grid)?;
+    } else {
+        renderer.check_room(job.mesh.points().len(), &job.tetrahedra)?;
+        progress::during("matching faces", |p| renderer.set_mesh_with_progress(&job.mesh, job.tetrahedra.clone(), p));
+    }
     renderer.set_field(&job.field)?;
     renderer.set_transfer(&job.scene.transfer);
     let name = renderer.stats().adapter.clone();

@@ -6,10 +6,12 @@ use crate::error::{Error, Result};
 use crate::io::data::{DataArray, Store};
 use crate::io::number::{Number, with_kind};
 use crate::io::{Progress, validated};
+use crate::memory;
 use crate::mesh::{Array, LeftOut, Mesh};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::{BTreeSet, HashMap};
+use std::fmt::Display;
 use std::path::Path;
 
 /// A grid whose head has been read.
@@ -21,11 +23,14 @@ pub(super) struct Grid<'a> {
 }
 
 /// The arrays of points or cells, and those that had to be left out.
-type Data = (Vec<Array>, Vec<LeftOut>);
+pub(super) type Data = (Vec<Array>, Vec<LeftOut>);
+
+/// Which arrays of points and of cells were left out.
+pub(super) type LeftOutBoth = [Vec<LeftOut>; 2];
 
 impl Grid<'_> {
     /// Reads the arrays, and makes one mesh of all pieces. Also says which arrays of points and of cells it left out.
-    pub(super) fn mesh(&self) -> Result<(Mesh, [Vec<LeftOut>; 2])> {
+    pub(super) fn mesh(&self) -> Result<(Mesh, LeftOutBoth)> {
         let points = self.pieces.iter().fold(0u64, |sum, piece| sum.saturating_add(piece.points));
         if points >= u64::from(u32::MAX) {
             let what = format!("{points} points are more than Halite can index (2^32 - 2)");
@@ -52,7 +57,7 @@ impl Grid<'_> {
         Error::malformed(&self.store(piece).input.path, what)
     }
 
-    fn points(&self) -> Result<Vec<DVec3>> {
+    pub(super) fn points(&self) -> Result<Vec<DVec3>> {
         let read = |(i, piece): (usize, &Piece)| {
             let fail = |what: &str| self.malformed(piece, format!("the Points of piece {i} {what}"));
             match piece.arrays(Section::Points).first() {
@@ -65,7 +70,9 @@ impl Grid<'_> {
             }
         };
         let parts = self.pieces.par_iter().enumerate().map(read).collect::<Result<Vec<_>>>()?;
-        Ok(joined(parts).par_chunks_exact(3).map(DVec3::from_slice).collect())
+        let numbers = joined("its points", parts)?;
+        memory::check_array::<f64>("its points", numbers.len())?;
+        Ok(numbers.par_chunks_exact(3).map(DVec3::from_slice).collect())
     }
 
     /// Reads indices of any number type, all that there are or so many. `check` turns each into what is kept, or
@@ -95,7 +102,7 @@ impl Grid<'_> {
     }
 
     /// Reads numbers of any type as f64.
-    fn floats(&self, piece: &Piece, array: &DataArray, tuples: u64) -> Result<Vec<f64>> {
+    pub(super) fn floats(&self, piece: &Piece, array: &DataArray, tuples: u64) -> Result<Vec<f64>> {
         let count = tuples.saturating_mul(array.components as u64);
         self.store(piece).array(array)?.read(count, &self.progress, &|_, numbers, out| {
             let out = bytemuck::cast_slice_mut::<u8, f64>(out);
@@ -109,7 +116,9 @@ impl Grid<'_> {
     /// Reads bits, the highest of a byte first, as 0 and 1; numbers of another type as what a byte holds of them.
     fn bits(&self, piece: &Piece, array: &DataArray, tuples: u64) -> Result<Vec<u8>> {
         if !array.bits {
-            return Ok(self.floats(piece, array, tuples)?.into_iter().map(|x| x as u8).collect());
+            let floats = self.floats(piece, array, tuples)?;
+            memory::check_array::<u8>(array, floats.len())?;
+            return Ok(floats.into_iter().map(|x| x as u8).collect());
         }
         let count = tuples.saturating_mul(array.components as u64);
         let bytes: Vec<u8> =
@@ -117,12 +126,13 @@ impl Grid<'_> {
                 out.copy_from_slice(numbers);
                 Ok(())
             })?;
+        memory::check_array::<u8>(array, count as usize)?;
         Ok((0..count as usize).map(|i| bytes[i / 8] >> (7 - i % 8) & 1).collect::<Vec<u8>>())
     }
 
     /// The arrays of point or cell data that all pieces have, pieces with no points (or cells) aside, as far as they are
     /// whole.
-    fn data(&self, section: Section) -> Result<Data> {
+    pub(super) fn data(&self, section: Section) -> Result<Data> {
         let filled: Vec<&Piece> = self.pieces.iter().filter(|piece| piece.tuples(section) > 0).collect();
         let filled = if filled.is_empty() { self.pieces.iter().take(1).collect() } else { filled };
         let found: Vec<HashMap<Key<'_>, &DataArray>> =
@@ -169,7 +179,7 @@ impl Grid<'_> {
         };
         let values = if parts.iter().any(|(_, part)| part.bits) {
             let bits = parts.iter().map(|(piece, part)| self.bits(piece, part, piece.tuples(section)));
-            u8::values(joined(bits.collect::<Result<Vec<_>>>()?))
+            u8::values(joined(first, bits.collect::<Result<Vec<_>>>()?)?)
         } else if parts.iter().all(|(_, part)| part.kind == first.kind) {
             with_kind!(first.kind, T => {
                 let read = |(piece, part): &(&Piece, &DataArray)| {
@@ -179,7 +189,7 @@ impl Grid<'_> {
                         Ok(())
                     })
                 };
-                T::values(joined(parts.iter().map(read).collect::<Result<Vec<_>>>()?))
+                T::values(joined(first, parts.iter().map(read).collect::<Result<Vec<_>>>()?)?)
             })
         } else {
             let (path, name) = (self.path.display(), &first.name);
@@ -188,7 +198,7 @@ impl Grid<'_> {
                 first.section
             );
             let floats = parts.iter().map(|(piece, part)| self.floats(piece, part, piece.tuples(section)));
-            f64::values(joined(floats.collect::<Result<Vec<_>>>()?))
+            f64::values(joined(first, floats.collect::<Result<Vec<_>>>()?)?)
         };
         Ok(Array { name: first.name.clone(), components: first.components, values })
     }
@@ -207,6 +217,12 @@ fn keyed(arrays: &[DataArray]) -> impl Iterator<Item = (Key<'_>, &DataArray)> {
 }
 
 /// One vector of several, without a copy if there is only one.
-pub(super) fn joined<T: Copy>(mut parts: Vec<Vec<T>>) -> Vec<T> {
-    if parts.len() == 1 { parts.swap_remove(0) } else { parts.concat() }
+pub(super) fn joined<T: Copy>(what: impl Display, mut parts: Vec<Vec<T>>) -> Result<Vec<T>> {
+    if parts.len() == 1 {
+        return Ok(parts.swap_remove(0));
+    }
+    let mut all = Vec::new();
+    memory::reserve(what, &mut all, parts.iter().map(Vec::len).sum())?;
+    parts.iter().for_each(|part| all.extend_from_slice(part));
+    Ok(all)
 }
