@@ -449,7 +449,9 @@ impl Renderer {
         self.stats.integral = table.map_or(Form::Exact, |t| t.choice().form).name().into();
         self.stats.table_ms = built.as_ref().map_or(0.0, |b| b.ms);
         self.stats.table_bytes = table.map_or(0, |t| Choice::bytes(t.size()));
-        let switches = &self.switches;
+        // What draws by itself is exact: variants are for those who ask for the projection.
+        let none = Switches::default();
+        let switches = if self.engine == Engine::Auto { &none } else { &self.switches };
         let frame = Frame { mesh, field, transfer, exact, table, view, switches, progress };
         let uploaded = self.backend.gpu().map_or(0, Gpu::uploaded);
         let mut walk = Backend::Walk;

@@ -314,8 +314,9 @@ struct Settings
   std::size_t threads = 0;
   /// "auto", "cpu", or a GPU by index, UUID or part of its name.
   std::string device;
-  /// "auto" or "traverse": rays walk from cell to cell. "project": cells are sorted by depth and blended; it needs a
-  /// device for graphics (not "cpu"), refuses the maximum, and its order is right for some meshes only.
+  /// "auto": "project" on the CPU, "traverse" on a device for graphics. "traverse": rays walk from cell to cell. "project": cells are
+  /// projected. On the CPU their order is verified in every pixel, and pictures are those of the walk. On a device cells are
+  /// sorted by depth, which is right for some meshes only, and the maximum is refused.
   std::string engine;
   /// See Renderer::setIntegral.
   Integral integral;

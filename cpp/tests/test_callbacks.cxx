@@ -166,7 +166,7 @@ int main()
       lines[i].push_back(line);
       if (user)
       {
-        EXPECT(user->statistics().engine == "traverse");
+        EXPECT(user->statistics().engine == "project");
         throw 42;
       }
     };

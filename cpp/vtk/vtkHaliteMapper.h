@@ -58,9 +58,9 @@ public:
 
   ///@{
   /**
-   * How: "auto" (the default) or "traverse", by rays that walk from cell to cell; or "project", which sorts cells by depth and blends
-   * them. That needs a device for graphics, be it in software, so it is an error with Device "cpu"; it refuses maximum intensity;
-   * and its order is right for some meshes only.
+   * How: "auto" (the default), which is "project" on the CPU and "traverse" on a device for graphics; "traverse", by rays that walk
+   * from cell to cell; or "project", which projects cells. On the CPU their order is verified in every pixel, so pictures are those of
+   * the walk. On a device cells are sorted by depth, which is right for some meshes only, and maximum intensity is refused.
    */
   vtkSetStringMacro(Engine);
   vtkGetStringMacro(Engine);
