@@ -228,7 +228,9 @@ fn project_by<const N: usize>(sweep: &mut Sweep, frame: &Frame, values: &Values<
         redrawn_dense: dense,
         handed_over: counts.handed_over.map(Into::into),
     };
-    Ok(Drawn { pixels, counts: counts.walked, sweep: Some(sweep), ..Drawn::default() })
+    let mut walked = counts.walked;
+    walked.steps += counts.fragments;
+    Ok(Drawn { pixels, counts: walked, sweep: Some(sweep), ..Drawn::default() })
 }
 
 fn project_on<const N: usize>(project: &mut Project, frame: &Frame, values: &Values<N>) -> Result<Drawn> {

@@ -274,8 +274,7 @@ impl Dealt {
     pub(super) fn new(lens: &Lens, boxes: &[PixelBox]) -> Self {
         let [columns, tiles] = lens.tiles();
         let n = boxes.len();
-        let parts =
-            (0..PARTS).into_par_iter().map(|k| deal(columns, tiles, n * k / PARTS..n * (k + 1) / PARTS, boxes));
+        let parts = (0..PARTS).into_par_iter().map(|k| deal(columns, tiles, n * k / PARTS..n * (k + 1) / PARTS, boxes));
         Dealt { parts: parts.collect() }
     }
 

@@ -35,10 +35,8 @@ fn faint<S: Simd>(simd: S, x: f32x8<S>, y: f32x8<S>) -> [f32x8<S>; 3] {
     let (square, h) = (depth * depth, depth * 0.5);
     let q = h * series(simd, h, &[1.0, -0.5, 1.0 / 6.0, -1.0 / 24.0]);
     let even = square * series(simd, square, &[1.0 / 24.0, 1.0 / 1920.0]);
-    let bent = rise.mul_add(
-        series(simd, rise, &[1.0 / 240.0, 1.0 / 6720.0]),
-        series(simd, square, &[1.0 / 12.0, 1.0 / 480.0]),
-    );
+    let bent = rise
+        .mul_add(series(simd, rise, &[1.0 / 240.0, 1.0 / 6720.0]), series(simd, square, &[1.0 / 12.0, 1.0 / 480.0]));
     let e = one - q;
     let scaled = e * depth;
     let alpha = scaled.mul_add(even, scaled);
@@ -68,10 +66,8 @@ fn mild<S: Simd>(simd: S, x: f32x8<S>, y: f32x8<S>, direct: bool) -> [f32x8<S>; 
     let even = square * series(simd, square, &[1.0 / 24.0, 1.0 / 1920.0, 1.0 / 322_560.0]);
     let once = series(simd, square, &[1.0 / 12.0, 1.0 / 480.0, 1.0 / 53_760.0]);
     let twice = series(simd, square, &[1.0 / 240.0, 1.0 / 13_440.0]);
-    let thrice = rise.mul_add(
-        f32x8::splat(simd, 1.0 / 241_920.0),
-        series(simd, square, &[1.0 / 6720.0, 1.0 / 483_840.0]),
-    );
+    let thrice =
+        rise.mul_add(f32x8::splat(simd, 1.0 / 241_920.0), series(simd, square, &[1.0 / 6720.0, 1.0 / 483_840.0]));
     let bent = rise.mul_add(rise.mul_add(thrice, twice), once);
     let e = one - q;
     let scaled = e * depth;

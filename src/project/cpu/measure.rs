@@ -124,7 +124,14 @@ impl Waiting {
 
     /// Keeps up to eight pieces behind the others; `count` says how many they are.
     #[inline(always)]
-    fn add<S: Simd>(&mut self, depth: [f32x8<S>; 2], value: [f32x8<S>; 2], length: f32x8<S>, id: i32x8<S>, count: usize) {
+    fn add<S: Simd>(
+        &mut self,
+        depth: [f32x8<S>; 2],
+        value: [f32x8<S>; 2],
+        length: f32x8<S>,
+        id: i32x8<S>,
+        count: usize,
+    ) {
         let at = self.count.min(WAITING - 16);
         depth[0].store_slice(&mut self.depth[0][at..at + 8]);
         depth[1].store_slice(&mut self.depth[1][at..at + 8]);
@@ -266,7 +273,8 @@ impl<const N: usize> Canvas<N> {
     fn on_one_line<S: Simd>(&mut self, simd: S, exact: &Exact<f32>, r: &Record<N>) {
         let k = usize::from(r.lines[0]);
         let low = exact.opacity.s[k];
-        let (value, slope) = (f32x8::splat(simd, exact.opacity.value[k][0]), f32x8::splat(simd, exact.opacity.slope[k][0]));
+        let (value, slope) =
+            (f32x8::splat(simd, exact.opacity.value[k][0]), f32x8::splat(simd, exact.opacity.slope[k][0]));
         let line = i32x8::splat(simd, (k as i32) << 16);
         let count = self.found.count.min(PIXELS);
         for i in (0..count).step_by(8) {
@@ -411,7 +419,13 @@ impl<const N: usize> Canvas<N> {
                     let [alpha, f, b] = piece(simd, front[0] * length, back[0] * length, direct);
                     let [f, b] = if direct { [f * length, b * length] } else { [f, b] };
                     let color = |c: usize| front[c].mul_add(f, back[c] * b);
-                    add(simd, &mut self.light, [color(1), color(2), color(3), alpha], eight.map(|p| p.pixel), parts.len());
+                    add(
+                        simd,
+                        &mut self.light,
+                        [color(1), color(2), color(3), alpha],
+                        eight.map(|p| p.pixel),
+                        parts.len(),
+                    );
                 }
                 self.found.parts.clear();
             },

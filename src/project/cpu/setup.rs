@@ -176,11 +176,7 @@ type Triple<S> = [f64x4<S>; 3];
 /// instructions are known.)
 #[inline(always)]
 fn cross<S: Simd>(a: Triple<S>, b: Triple<S>) -> Triple<S> {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// Puts the first corner, relative to the lens's origin, and the edges from there into lane `l`.
@@ -197,11 +193,8 @@ fn relative(lens: &Lens, p: &[DVec3; 4], l: usize, from: &mut [[f64; 4]; 3], edg
 /// `rows` times the vectors.
 #[inline(always)]
 fn turn<S: Simd>(simd: S, rows: &[DVec3; 3], d: &[[f64; 4]; 3]) -> Triple<S> {
-    let (x, y, z) = (
-        f64x4::load_array_ref(simd, &d[0]),
-        f64x4::load_array_ref(simd, &d[1]),
-        f64x4::load_array_ref(simd, &d[2]),
-    );
+    let (x, y, z) =
+        (f64x4::load_array_ref(simd, &d[0]), f64x4::load_array_ref(simd, &d[1]), f64x4::load_array_ref(simd, &d[2]));
     let [a, b, c] = rows;
     [
         x.mul_add(f64x4::splat(simd, a.x), y.mul_add(f64x4::splat(simd, a.y), z * a.z)),
@@ -403,7 +396,8 @@ fn set_up_four<S: Simd, const N: usize>(
             f32x4::load_array(simd, v[3]),
         ];
         let slope = |x: usize| (rise[0] * a[0][x] + rise[1] * a[1][x] + rise[2] * a[2][x]) * over;
-        fields[n] = by_cell(simd, [v[0], single(simd, slope(0) * m), single(simd, slope(1) * m), single(simd, slope(2))]);
+        fields[n] =
+            by_cell(simd, [v[0], single(simd, slope(0) * m), single(simd, slope(1) * m), single(simd, slope(2))]);
         let (low, high) = (v[0].min(v[1]).min(v[2].min(v[3])), v[0].max(v[1]).max(v[2].max(v[3])));
         spans[n] = [low.to_array(), high.to_array()];
         // NaN if any is not finite.

@@ -8,7 +8,7 @@ use crate::gpu::DeviceChoice;
 use crate::gpu::testing::choice;
 use crate::mesh::cells::Tetrahedra;
 use crate::mesh::{Mesh, generate};
-use crate::render::Renderer;
+use crate::render::{Engine, Renderer};
 use crate::view::{Blend, Camera, Projection, View};
 use glam::DVec3;
 
@@ -21,7 +21,8 @@ fn compare(rounds: usize, frames: usize, size: [u32; 2], seed: u64) {
     let (mut beyond, mut pixels) = (0, 0);
     let all: Vec<_> = (0..rounds).flat_map(|_| meshes(&mut random)).collect();
     for (name, mesh) in all {
-        let mut pair = [choice.clone(), DeviceChoice::Cpu].map(|c| Renderer::with_device(0, c).unwrap());
+        let mut pair =
+            [choice.clone(), DeviceChoice::Cpu].map(|c| Renderer::with_engine(0, c, Engine::Traverse).unwrap());
         for r in &mut pair {
             r.set_mesh(&mesh, Tetrahedra::new(&mesh).unwrap());
         }
@@ -92,7 +93,8 @@ fn the_twins_agree_where_rays_lie_in_faces() {
     for (name, mesh) in meshes {
         let points = mesh.points().iter().map(|p| (p * 3.0).round() / 3.0).collect();
         let mesh = plain(Mesh::new(points, mesh.cells().clone(), vec![], vec![]).unwrap());
-        let mut pair = [choice.clone(), DeviceChoice::Cpu].map(|c| Renderer::with_device(0, c).unwrap());
+        let mut pair =
+            [choice.clone(), DeviceChoice::Cpu].map(|c| Renderer::with_engine(0, c, Engine::Traverse).unwrap());
         for r in &mut pair {
             r.set_mesh(&mesh, Tetrahedra::new(&mesh).unwrap());
             r.set_field(&Field::new(&mesh, "scalar", Some(Association::Point), Component::All).unwrap()).unwrap();
