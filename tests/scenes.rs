@@ -72,7 +72,7 @@ fn stem(path: &Path) -> String {
 fn open(file: &Path) -> halite::Result<(Scene, View)> {
     let scene = scene::Scene::open(file)?;
     let mesh = halite::io::open(&scene.mesh, &|_| ())?;
-    let (field, (view, _)) = (scene.scalars.field(&mesh)?, scene.view()?);
+    let (field, (view, _)) = (scene.field(&mesh)?, scene.view()?);
     Ok((Scene { tetrahedra: Tetrahedra::new(&mesh)?, mesh, field, transfer: scene.transfer }, view))
 }
 

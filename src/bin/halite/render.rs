@@ -279,7 +279,8 @@ fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut Steps) -> R
             None => options.scalars(given.as_ref(), &mesh)?,
         };
         steps.scalars = Some(scalars.clone());
-        let field = scalars.field(&mesh).with_context(|| path.display().to_string())?;
+        let second = given.as_ref().and_then(|scene| scene.gradient_array.as_deref());
+        let field = scalars.field_with(&mesh, second).with_context(|| path.display().to_string())?;
         options.check(&field)?;
         (scalars, field)
     };
@@ -320,6 +321,9 @@ fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut Steps) -> R
     let legend = if solid { None } else { Legend::new(&scalars, &field, &scene.transfer, options.log) };
     if let (Some((color, opacity)), false) = (options.nan_color, solid) {
         let (transfer, blend) = (&scene.transfer, scene.blend);
+        if !transfer.is_of_one_variable() {
+            bail!("--nan-color: the scene has a second variable or light, of which missing values have none");
+        }
         let shown = missing::shown(&mesh, &tetrahedra, &scalars, transfer, blend, color, opacity)?;
         if let Some(shown) = shown {
             (field, scene.transfer) = (shown.field, shown.transfer);
