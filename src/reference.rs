@@ -48,7 +48,8 @@ const COMPONENTS: usize = 5;
 /// What a segment of `length` world units emits and absorbs, premultiplied RGBA, whose field of one component, in the
 /// array's own units, is linear from `front`, where the ray enters, to `back`.
 pub fn segment(transfer: &TransferFunction, front: f64, back: f64, length: f64) -> [f64; 4] {
-    let alone = Reference { transfer, kind: Kind::Scalar, cells: vec![], centre: DVec3::ZERO, extent: 0.0, steepest: 0.0 };
+    let alone =
+        Reference { transfer, kind: Kind::Scalar, cells: vec![], centre: DVec3::ZERO, extent: 0.0, steepest: 0.0 };
     let interval = Interval { t: [0.0, length], values: [front, back].map(|s| [s, 0.0, 0.0, 0.0, 0.0]) };
     alone.composite(std::iter::once(interval))
 }
@@ -125,8 +126,12 @@ impl<'a> Reference<'a> {
                 }
                 Some([at(0), at(1), at(2), at(3), 0.0])
             };
-            let mut tet =
-                Tetrahedron { corners: [DVec3::ZERO; 4], values: [[0.0; COMPONENTS]; 4], centre: DVec3::ZERO, radius: 0.0 };
+            let mut tet = Tetrahedron {
+                corners: [DVec3::ZERO; 4],
+                values: [[0.0; COMPONENTS]; 4],
+                centre: DVec3::ZERO,
+                radius: 0.0,
+            };
             for (k, &c) in corners.iter().enumerate() {
                 let (Some(point), Some(values)) = (points.get(c as usize), value(c)) else {
                     return Err(Error::Mesh(format!("tetrahedron {i} names a point or cell that does not exist")));
@@ -247,7 +252,8 @@ impl<'a> Reference<'a> {
         let last = self.kind.components() - 1;
         let at = |x: f64| {
             let u = u0 + (u1 - u0) * x;
-            let v: [f64; COMPONENTS] = std::array::from_fn(|k| interval.values[0][k] * (1.0 - u) + interval.values[1][k] * u);
+            let v: [f64; COMPONENTS] =
+                std::array::from_fn(|k| interval.values[0][k] * (1.0 - u) + interval.values[1][k] * u);
             let [r, g, b] = self.color(&v);
             [r, g, b, self.transfer.opacity_at(v[last])]
         };

@@ -2,6 +2,7 @@
 
 mod backend;
 mod prepared;
+mod second;
 mod stats;
 mod tables;
 
@@ -23,6 +24,7 @@ use crate::view::{Blend, View};
 use backend::{Backend, Drawn};
 use glam::DVec3;
 use prepared::{AnyValues, Prepared};
+use second::Extra;
 pub use stats::{ProjectionStats, Stats, SweepStats};
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -55,6 +57,10 @@ pub struct Renderer {
     field: Option<Prepared>,
     transfer: Option<TransferFunction>,
     exact: Option<Exact<f32>>,
+    /// What a second variable, or light, needs.
+    extra: Extra,
+    /// The engine that was said to draw neither.
+    lacking: Option<&'static str>,
     integral: Choice,
     tables: Tables,
     /// What of a table is needed, once that is known: none for the exact integral.
@@ -172,6 +178,8 @@ impl Renderer {
             field: None,
             transfer: None,
             exact: None,
+            extra: Extra::default(),
+            lacking: None,
             integral: Choice::default(),
             tables: Tables::default(),
             key: None,
@@ -192,11 +200,18 @@ impl Renderer {
         // Whether tables are built on the device depends on it.
         self.key = None;
         let flat = self.mesh.as_ref().is_some_and(|m| m.flat);
-        self.stats.engine = if flat { Backend::without_device().engine() } else { self.backend.engine() }.into();
+        let second = self.transfer.as_ref().is_some_and(|t| !t.is_of_one_variable());
+        let walks = flat || second;
+        self.stats.engine = if walks { Backend::without_device().engine() } else { self.backend.engine() }.into();
         if flat && self.backend.gpu().is_some() && self.stats.device != "cpu" {
             tracing::warn!("the mesh is too flat for the 32-bit floats of a device; the CPU draws it, by the walk");
         }
-        (self.stats.device, self.stats.adapter) = match self.backend.gpu().filter(|_| !flat) {
+        let lacking = self.backend.lacks_second().filter(|_| second && !flat);
+        if let (Some(engine), true) = (lacking, lacking != self.lacking) {
+            tracing::warn!("{engine} draws neither a second variable nor light yet; the walk on the CPU draws them");
+        }
+        self.lacking = lacking;
+        (self.stats.device, self.stats.adapter) = match self.backend.gpu().filter(|_| !walks) {
             Some(gpu) => ("gpu".into(), gpu.adapter.name.clone()),
             None => ("cpu".into(), format!("{} threads", self.pool.current_num_threads())),
         };
@@ -205,6 +220,10 @@ impl Renderer {
     /// Takes `part` for changed, wherever it is kept.
     fn forget(&mut self, part: Part) {
         (self.exact, self.key) = (None, None);
+        match part {
+            Part::Function => self.extra.forget_function(),
+            Part::Mesh | Part::Field | Part::Points => self.extra.forget_field(),
+        }
         self.backend.forget(part);
         self.backend.forget(Part::Function);
     }
@@ -295,6 +314,7 @@ impl Renderer {
             return self.connect(points);
         }
         self.name_device();
+        self.extra.forget_field();
         self.backend.forget(Part::Points);
         // Extinction counts per normalised length.
         if scaled {
@@ -338,6 +358,7 @@ impl Renderer {
     pub fn set_transfer(&mut self, transfer: &TransferFunction) {
         self.transfer = Some(transfer.clone());
         self.forget(Part::Function);
+        self.name_device();
     }
 
     /// Draws a frame. `progress` is told the share that is done, in [0, 1], and may be called from several threads. It
@@ -424,8 +445,10 @@ impl Renderer {
     }
 
     fn try_render(&mut self, view: &View, progress: &Progress) -> Result<Image> {
+        if self.transfer.as_ref().is_some_and(|t| !t.is_of_one_variable()) {
+            return self.render_second(view, progress);
+        }
         let start = Instant::now();
-        let missing = |what: &str| Error::Render(format!("there is no {what} to draw"));
         let flat = self.mesh.as_ref().is_some_and(|m| m.flat);
         let on_device = !flat && !self.host_builds && self.backend.gpu().is_some_and(|gpu| builds(gpu, &self.integral));
         self.fit_values()?;
@@ -502,7 +525,7 @@ impl Renderer {
         self.stats.device_ms = device_ms;
         self.stats.steps = counts.steps;
         self.stats.repaired_rays = counts.repaired;
-        self.stats.cpu_rays = counts.unfinished;
+        (self.stats.cpu_rays, self.stats.panels) = (counts.unfinished, 0);
         (self.stats.projection, self.stats.sweep) = (projection, sweep);
         self.stats.frame_ms = ms(start);
         self.build_next(late)?;
@@ -547,6 +570,10 @@ impl Frame<'_> {
         let a = self.transfer.opacity_at(own(N - 1)).min(1.0);
         [r * a, g * a, b * a, a].map(|c| c as f32)
     }
+}
+
+fn missing(what: &str) -> Error {
+    Error::Render(format!("there is no {what} to draw"))
 }
 
 fn ms(since: Instant) -> f64 {

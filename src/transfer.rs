@@ -229,7 +229,7 @@ impl TransferFunction {
 }
 
 /// The piecewise linear function through `knots` at `s`, right-continuous at steps.
-fn interpolate<T>(knots: &[(f64, T)], s: f64, clamp: bool, value: impl Fn(&T) -> f64) -> f64 {
+pub(crate) fn interpolate<T>(knots: &[(f64, T)], s: f64, clamp: bool, value: impl Fn(&T) -> f64) -> f64 {
     let above = knots.partition_point(|k| k.0 <= s);
     let last = knots.len() - 1;
     match above {

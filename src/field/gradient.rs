@@ -184,11 +184,12 @@ impl Summer<'_> {
         let [across, beside, over] = [b.cross(c), c.cross(a), a.cross(b)];
         let mut det = a.dot(across);
         // The sign of what is flat but for rounding is that of the points as they are.
-        let doubt = 1e-14 * a.abs().dot(DVec3::new(
-            b.y.abs() * c.z.abs() + b.z.abs() * c.y.abs(),
-            b.z.abs() * c.x.abs() + b.x.abs() * c.z.abs(),
-            b.x.abs() * c.y.abs() + b.y.abs() * c.x.abs(),
-        ));
+        let doubt = 1e-14
+            * a.abs().dot(DVec3::new(
+                b.y.abs() * c.z.abs() + b.z.abs() * c.y.abs(),
+                b.z.abs() * c.x.abs() + b.x.abs() * c.z.abs(),
+                b.x.abs() * c.y.abs() + b.y.abs() * c.x.abs(),
+            ));
         if det.abs() <= doubt {
             let [p, q, r, s] = points.map(|p| {
                 let DVec3 { x, y, z } = p * self.scale;
@@ -270,8 +271,7 @@ mod tests {
         let corners = Tetrahedra::new(&whole).unwrap().corners;
         let alone = |jump: f64| {
             let points: Vec<DVec3> = corners.iter().flatten().map(|&p| whole.points()[p as usize]).collect();
-            let values: Vec<f64> =
-                points.iter().enumerate().map(|(i, &p)| curved(p) + jump * (i / 4) as f64).collect();
+            let values: Vec<f64> = points.iter().enumerate().map(|(i, &p)| curved(p) + jump * (i / 4) as f64).collect();
             let cells = crate::mesh::Cells {
                 types: vec![10; corners.len()],
                 offsets: (0..=corners.len() as u64).map(|i| 4 * i).collect(),

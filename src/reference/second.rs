@@ -47,7 +47,13 @@ pub(super) fn variables(
         return match second {
             _ if transfer.shading().is_some() => Err("values of cells have no gradient".into()),
             None if !widgets => Err("values of cells have no gradient".into()),
-            second => Ok(Some(values.iter().enumerate().map(|(i, _)| [second.as_ref().map_or(0.0, |g| g[i]), 0.0, 0.0, 0.0]).collect())),
+            second => Ok(Some(
+                values
+                    .iter()
+                    .enumerate()
+                    .map(|(i, _)| [second.as_ref().map_or(0.0, |g| g[i]), 0.0, 0.0, 0.0])
+                    .collect(),
+            )),
         };
     }
     let key = |p: usize| {

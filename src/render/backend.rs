@@ -108,6 +108,16 @@ impl Backend {
         matches!(self, Backend::WalkOnDevice(_))
     }
 
+    /// What it cannot draw a second variable or light with; none if it can.
+    pub(super) fn lacks_second(&self) -> Option<&'static str> {
+        match self {
+            Backend::Walk => None,
+            Backend::WalkOnDevice(_) => Some("the walk on a device"),
+            Backend::Project(_) => Some("the projection on the CPU"),
+            Backend::ProjectOnDevice(_) => Some("the projection on a device"),
+        }
+    }
+
     /// Whether it reads the neighbours of cells and the boundary.
     pub(super) fn needs_neighbours(&self) -> bool {
         !matches!(self, Backend::ProjectOnDevice(_))

@@ -150,7 +150,8 @@ impl TableJson {
             return Err(Error::malformed(&path, what));
         };
         let (texels, _) = values.as_chunks::<4>();
-        Table::new([columns, rows], texels.to_vec(), [self.s, self.g]).map_err(|e| Error::malformed(&path, e.to_string()))
+        Table::new([columns, rows], texels.to_vec(), [self.s, self.g])
+            .map_err(|e| Error::malformed(&path, e.to_string()))
     }
 }
 
@@ -230,7 +231,9 @@ impl Second {
             return Err(malformed(format!("{key}: a maximum along rays has none; \"blend\": \"composite\" does")));
         }
         if self.widgets.is_some() && self.table.is_some() {
-            return Err(malformed("table2d: there are widgets, and only one of the two can say colour and opacity".into()));
+            return Err(malformed(
+                "table2d: there are widgets, and only one of the two can say colour and opacity".into(),
+            ));
         }
         if self.lights.is_some() && self.shade.is_none() {
             return Err(malformed("lights: nothing is lit without \"shade\"".into()));
@@ -241,9 +244,10 @@ impl Second {
         };
         let mut bivariate = Bivariate::default();
         if let Some(widgets) = self.widgets {
-            let widgets = widgets.into_iter().enumerate().map(|(i, w)| {
-                w.widget().map_err(|what| malformed(format!("widgets[{i}]: {what}")))
-            });
+            let widgets = widgets
+                .into_iter()
+                .enumerate()
+                .map(|(i, w)| w.widget().map_err(|what| malformed(format!("widgets[{i}]: {what}"))));
             bivariate = bivariate.with_widgets(widgets.collect::<Result<_>>()?).map_err(valid)?;
         }
         if let Some(table) = self.table {
@@ -266,9 +270,8 @@ impl Second {
                 two_sided: s.two_sided.unwrap_or(true),
             };
             let lights = self.lights.map_or(Ok(vec![Light::default()]), |lights| {
-                let light = |(i, l): (usize, LightJson)| {
-                    l.light().map_err(|what| malformed(format!("lights[{i}]: {what}")))
-                };
+                let light =
+                    |(i, l): (usize, LightJson)| l.light().map_err(|what| malformed(format!("lights[{i}]: {what}")));
                 lights.into_iter().enumerate().map(light).collect()
             });
             shading = shading.with_lights(shade, lights?).map_err(valid)?;

@@ -94,6 +94,11 @@ impl Wave {
         (along(self.axis[0], s) + along(self.axis[1], g) - self.start) / self.period
     }
 
+    /// By how much the phase rises where s and g rise by so much.
+    pub(crate) fn rise(&self, rise: [f64; 2]) -> f64 {
+        (self.axis[0] * rise[0] + self.axis[1] * rise[1]) / self.period
+    }
+
     /// What the floor leaves of a wave of height `w`.
     fn above(&self, w: f64) -> f64 {
         if self.floor > 0.0 { ((w - self.floor) / (1.0 - self.floor)).max(0.0) } else { w }
@@ -330,9 +335,10 @@ mod tests {
     #[test]
     fn widgets_are_what_song_et_al_draw() {
         let box_only = Widget { domain: [[1.0, 2.0], [f64::NEG_INFINITY, 5.0]], ..widget(Shape::Uniform) };
-        assert_eq!([[1.0, 5.0], [2.0, -9.0], [0.999, 0.0], [1.5, 5.001]].map(|at| box_only.opacity_at(at)), [
-            0.8, 0.8, 0.0, 0.0
-        ]);
+        assert_eq!(
+            [[1.0, 5.0], [2.0, -9.0], [0.999, 0.0], [1.5, 5.001]].map(|at| box_only.opacity_at(at)),
+            [0.8, 0.8, 0.0, 0.0]
+        );
         let gaussian = widget(Shape::Gaussian { center: [1.0, 2.0], sigma: [0.5, 3.0] });
         assert!((gaussian.opacity_at([1.5, 5.0]) - 0.8 * (-1.0_f64).exp()).abs() < 1e-15);
         let at = |shape: Shape, s: f64| widget(shape).opacity_at([s, 7.0]);
@@ -376,7 +382,8 @@ mod tests {
 
     #[test]
     fn what_cannot_be_is_named() {
-        let told = |w: Widget| Bivariate::default().with_widgets(vec![widget(Shape::Uniform), w]).unwrap_err().to_string();
+        let told =
+            |w: Widget| Bivariate::default().with_widgets(vec![widget(Shape::Uniform), w]).unwrap_err().to_string();
         let plain = || widget(Shape::Uniform);
         for (widget, part) in [
             (Widget { color: [0.0, 1.2, 0.0], ..plain() }, "widgets[1].color"),
@@ -395,7 +402,8 @@ mod tests {
         assert!(table([2, 2], [0.0; 4], ranges).contains("2 texels"));
         assert!(table([2, 1], [0.0, 0.0, 1.1, 0.0], ranges).contains("column 0 of row 0"));
         assert!(table([1, 2], [0.0; 4], [[0.0, 1.0], [1.0, 1.0]]).contains("range of g"));
-        let h = |knots: &[(f64, f64)]| Bivariate::default().with_gradient_opacity(knots.to_vec()).unwrap_err().to_string();
+        let h =
+            |knots: &[(f64, f64)]| Bivariate::default().with_gradient_opacity(knots.to_vec()).unwrap_err().to_string();
         assert!(h(&[]).contains("gradient_opacity") && h(&[(1.0, 0.0), (0.0, 0.0)]).contains("ascend"));
         assert!(h(&[(1.0, -2.0)]).contains("-2"));
     }

@@ -58,6 +58,17 @@ pub enum Origin {
     Position(DVec3),
 }
 
+impl Origin {
+    /// The same light in coordinates (world − `centre`) · `scale`; directions of length 1, towards the light.
+    pub(crate) fn moved(self, centre: DVec3, scale: f64) -> Self {
+        match self {
+            Origin::Headlight => self,
+            Origin::Direction(d) => Origin::Direction(-d.normalize()),
+            Origin::Position(p) => Origin::Position((p - centre) * scale),
+        }
+    }
+}
+
 impl Default for Light {
     /// A white headlight.
     fn default() -> Self {

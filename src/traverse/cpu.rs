@@ -2,15 +2,19 @@
 //!
 //! Positions are f64, so that thin layers and great distances cost no accuracy; segments are integrated in f32.
 
+mod segments;
+
 use crate::cell::{Face, Frame};
 use crate::geometry::boundary::{Beam, Candidate};
 use crate::geometry::{Cell, Geometry, Values};
 use crate::image::Image;
-use crate::integral::{Batch, Integral, Light};
+use crate::integral::second::Second;
+use crate::integral::{Integral, Light};
 use crate::mesh::faces::BOUNDARY;
 use crate::view::{Blend, View};
 use glam::DVec2;
 use rayon::prelude::*;
+use segments::{One, Segments, Two};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 
@@ -39,6 +43,8 @@ pub struct Counts {
     pub repaired: u64,
     /// Rays that a device left to the CPU.
     pub unfinished: u64,
+    /// Panels that segments of two variables, or with light, were summed up in.
+    pub panels: u64,
 }
 
 /// Draws a frame on the current rayon pool. `pixel` turns the largest values along a ray into a premultiplied colour
@@ -52,6 +58,28 @@ pub fn render<const N: usize>(
     view: &View,
     progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
 ) -> (Image, Counts) {
+    render_with(geometry, values, &|| One::new(integral), pixel, view, progress)
+}
+
+/// Draws a frame whose segments are of two variables, or with light: `values` are s and g, or those and the gradient.
+pub(crate) fn render_two<const N: usize>(
+    geometry: &Geometry,
+    values: &Values<N>,
+    second: &Second,
+    view: &View,
+    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+) -> (Image, Counts) {
+    render_with(geometry, values, &|| Two::new(second), &|_| [0.0; 4], view, progress)
+}
+
+fn render_with<const N: usize, S: Segments<N>>(
+    geometry: &Geometry,
+    values: &Values<N>,
+    segments: &(impl Fn() -> S + Sync),
+    pixel: &(dyn Fn(&[f32; N]) -> [f32; 4] + Sync),
+    view: &View,
+    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+) -> (Image, Counts) {
     let mut image = Image::new(view.size());
     let [w, h] = view.size();
     let (done, bands) = (AtomicUsize::new(0), h.div_ceil(TILE) as usize);
@@ -61,7 +89,7 @@ pub fn render<const N: usize>(
         .par_chunks_mut((w * TILE) as usize)
         .enumerate()
         .map(|(band, rows)| {
-            let mut tracer = Tracer::new(geometry, values, integral, view);
+            let mut tracer = Tracer::new(geometry, values, segments(), view);
             if stopped.load(Relaxed) {
                 return tracer.counts;
             }
@@ -71,12 +99,13 @@ pub fn render<const N: usize>(
             if progress((done.fetch_add(1, Relaxed) + 1) as f64 / bands as f64).is_break() {
                 stopped.store(true, Relaxed);
             }
-            tracer.counts
+            Counts { panels: tracer.segments.panels(), ..tracer.counts }
         })
         .reduce(Counts::default, |a, b| Counts {
             steps: a.steps + b.steps,
             repaired: a.repaired + b.repaired,
             unfinished: 0,
+            panels: a.panels + b.panels,
         });
     (image, counts)
 }
@@ -91,8 +120,8 @@ pub(crate) fn render_pixels<const N: usize>(
     indices: &[usize],
 ) -> Vec<[f32; 4]> {
     let w = view.size()[0];
-    let new = || Tracer::new(geometry, values, integral, view);
-    let draw = |tracer: &mut Tracer<N>, &index: &usize| {
+    let new = || Tracer::new(geometry, values, One::new(integral), view);
+    let draw = |tracer: &mut Tracer<N, One>, &index: &usize| {
         let (i, j) = ((index % w as usize) as u32, (index / w as usize) as u32);
         tracer.find_candidates([i, j], [i + 1, j + 1]);
         tracer.pixel(i, j, pixel)
@@ -115,20 +144,19 @@ struct Gathered<const N: usize> {
 }
 
 /// Traces rays, one after another.
-struct Tracer<'a, const N: usize> {
+struct Tracer<'a, const N: usize, S> {
     geometry: &'a Geometry,
     values: &'a Values<N>,
-    integral: Integral<'a>,
+    segments: S,
     view: &'a View,
     both_ways: bool,
     candidates: Vec<Candidate>,
     entries: Vec<Entry>,
-    batch: Batch,
     counts: Counts,
 }
 
-impl<'a, const N: usize> Tracer<'a, N> {
-    fn new(geometry: &'a Geometry, values: &'a Values<N>, integral: Integral<'a>, view: &'a View) -> Self {
+impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
+    fn new(geometry: &'a Geometry, values: &'a Values<N>, segments: S, view: &'a View) -> Self {
         let [low, high] = geometry.boundary.bounds();
         let both_ways = view.eye().is_some_and(|eye| {
             let eye = (eye - geometry.centre) * geometry.scale;
@@ -137,12 +165,11 @@ impl<'a, const N: usize> Tracer<'a, N> {
         Tracer {
             geometry,
             values,
-            integral,
+            segments,
             view,
             both_ways,
             candidates: vec![],
             entries: vec![],
-            batch: Batch::default(),
             counts: Counts::default(),
         }
     }
@@ -152,8 +179,8 @@ impl<'a, const N: usize> Tracer<'a, N> {
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") {
             #[target_feature(enable = "avx2")]
-            fn wide<const N: usize>(
-                tracer: &mut Tracer<N>,
+            fn wide<const N: usize, S: Segments<N>>(
+                tracer: &mut Tracer<N, S>,
                 left: u32,
                 top: u32,
                 rows: &mut [[f32; 4]],
@@ -259,7 +286,8 @@ impl<'a, const N: usize> Tracer<'a, N> {
         anyhow: bool,
         gathered: &mut Gathered<N>,
     ) -> bool {
-        self.batch.clear();
+        let (origin, along) = frame.ray();
+        self.segments.begin(origin, along);
         if !self.find_entries(frame, pixel) && !anyhow {
             return false;
         }
@@ -272,7 +300,7 @@ impl<'a, const N: usize> Tracer<'a, N> {
                 return false;
             }
         }
-        self.batch.flush(self.integral.exact.direct, &mut gathered.light);
+        self.segments.end(&mut gathered.light);
         true
     }
 
@@ -336,7 +364,7 @@ impl<'a, const N: usize> Tracer<'a, N> {
                             mix(&front, &back, ((x - entered) / (left - entered)) as f32)
                         }
                     };
-                    self.gather(at(from), at(to), to - from, gathered);
+                    self.gather(at(from), at(to), [from, to], gathered);
                 }
                 reached = left;
                 if reached >= t_max || self.is_over(gathered) {
@@ -355,18 +383,13 @@ impl<'a, const N: usize> Tracer<'a, N> {
     /// Whether nothing behind can be seen.
     #[inline(always)]
     fn is_over(&self, gathered: &Gathered<N>) -> bool {
-        gathered.light.through < least_light(self.integral.exact.direct)
+        gathered.light.through < self.segments.least_light()
     }
 
     #[inline(always)]
-    fn gather(&mut self, front: [f32; N], back: [f32; N], length: f64, gathered: &mut Gathered<N>) {
+    fn gather(&mut self, front: [f32; N], back: [f32; N], t: [f64; 2], gathered: &mut Gathered<N>) {
         if self.view.blend() == Blend::Composite {
-            match self.integral.table {
-                None => self.batch.add(self.integral.exact, &front, &back, length as f32, &mut gathered.light),
-                Some(table) => {
-                    table.add(self.integral.exact, front[N - 1], back[N - 1], length as f32, &mut gathered.light);
-                }
-            }
+            self.segments.add(&front, &back, t, &mut gathered.light);
         } else if front.iter().chain(&back).all(|v| v.is_finite()) {
             for v in [front, back] {
                 if gathered.largest.is_none_or(|l| v[N - 1] > l[N - 1]) {

@@ -3,8 +3,8 @@
 use crate::render::Request;
 use anyhow::{Result, bail};
 use halite::scene::Scene;
-use halite::transfer::colormap::ColorMap;
 use halite::transfer::Axis;
+use halite::transfer::colormap::ColorMap;
 use std::path::Path;
 
 /// How far knots may be off on a logarithmic axis: below what 8 bits show.
