@@ -226,6 +226,11 @@ impl Field {
         }
     }
 
+    /// Whether f32 holds each value exactly.
+    pub(crate) fn is_short(&self) -> bool {
+        matches!(*self.values, Stored::Short(_))
+    }
+
     /// Whether there is no value.
     pub fn is_empty(&self) -> bool {
         self.len() == 0

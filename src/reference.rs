@@ -5,6 +5,8 @@
 
 mod second;
 
+pub use second::segment_of_two;
+
 use crate::error::{Error, Result};
 use crate::field::{Association, Field, Kind};
 use crate::image::Image;

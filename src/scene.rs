@@ -198,3 +198,6 @@ impl Scene {
 
 #[cfg(test)]
 mod tests;
+
+#[cfg(test)]
+mod second_tests;

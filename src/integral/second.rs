@@ -9,7 +9,7 @@
 //! - a Gaussian's argument moves by at most 1.2 σ, a sinusoid's by 1.5 radians, a normal by 0.35 (less for sharp
 //!   highlights),
 //! - its optical depth is at most 1.5,
-//! - and the argument of the logarithm of the opacity convention changes by a factor of at most 6.
+//! - and the argument of the logarithm of the opacity convention changes by a factor of at most 2.
 //!
 //! The collocation is exact for integrands of degree 7, so in such panels it is off by less than 1e-6 of the piece; the
 //! number of panels follows the function, and is never fixed.
@@ -298,7 +298,10 @@ impl Second {
     }
 
     /// Values as they are handed over, s and g, in their own units.
-    pub(crate) fn own(&self, [s, g]: [f32; 2]) -> [f64; 2] {
-        [self.normal[0].invert(s.into()), self.normal[1].invert(g.into())]
+    pub(crate) fn own(&self, [s, g]: [f64; 2]) -> [f64; 2] {
+        [self.normal[0].invert(s), self.normal[1].invert(g)]
     }
 }
+
+#[cfg(test)]
+mod tests;

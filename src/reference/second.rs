@@ -23,6 +23,15 @@ struct Sample {
 /// What a sample emits and absorbs per world unit: red, green, blue and extinction.
 type Density = [f64; 4];
 
+/// What a segment of `length` world units emits and absorbs, premultiplied RGBA, whose scalar and second variable, in
+/// their own units, are linear from `front`, where the ray enters, to `back`. There is no gradient.
+pub fn segment_of_two(transfer: &TransferFunction, front: [f64; 2], back: [f64; 2], length: f64) -> [f64; 4] {
+    let (centre, kind) = (DVec3::ZERO, Kind::Scalar);
+    let alone = Reference { transfer, kind, cells: vec![], centre, extent: 0.0, steepest: 0.0 };
+    let interval = Interval { t: [0.0, length], values: [front, back].map(|[s, g]| [s, g, 0.0, 0.0, 0.0]) };
+    alone.composite_two(std::iter::once(interval), DVec3::ZERO, DVec3::Z)
+}
+
 /// Second variable and gradient at each of `points`: of the field's own array and by brute force. None if the transfer
 /// function asks for neither.
 ///

@@ -139,9 +139,16 @@ impl Extra {
         let lengths = self.gradient.as_ref().map_or([0.0; 2], |g| g.range().map(|l| l * scale));
         let ranges = [field.range(0), field.second().map_or(lengths, |g| g.range(0))];
         let wanted = places(transfer, LONGEST / scale);
+        let short = [field.is_short(), field.second().is_some_and(Field::is_short)];
         let normal = [0, 1].map(|k| {
             let [lo, hi] = [ranges[k][0].max(wanted[k][0]), ranges[k][1].min(wanted[k][1])];
-            if lo <= hi { Normal::new(lo, hi) } else { Normal::new(ranges[k][0], ranges[k][1]) }
+            let normal = if lo <= hi { Normal::new(lo, hi) } else { Normal::new(ranges[k][0], ranges[k][1]) };
+            // What f32 holds as it is, a power of two does not round.
+            if short[k] {
+                Normal { mid: 0.0, half: (normal.mid.abs() + normal.half).log2().ceil().exp2() }
+            } else {
+                normal
+            }
         });
         let good = |ready: &Ready| {
             let close = |old: Normal, new: Normal| {

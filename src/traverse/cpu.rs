@@ -11,6 +11,7 @@ use crate::image::Image;
 use crate::integral::second::Second;
 use crate::integral::{Integral, Light};
 use crate::mesh::faces::BOUNDARY;
+use crate::real::Real;
 use crate::view::{Blend, View};
 use glam::DVec2;
 use rayon::prelude::*;
@@ -76,7 +77,7 @@ fn render_with<const N: usize, S: Segments<N>>(
     geometry: &Geometry,
     values: &Values<N>,
     segments: &(impl Fn() -> S + Sync),
-    pixel: &(dyn Fn(&[f32; N]) -> [f32; 4] + Sync),
+    pixel: &(dyn Fn(&[S::Value; N]) -> [f32; 4] + Sync),
     view: &View,
     progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
 ) -> (Image, Counts) {
@@ -138,9 +139,9 @@ struct Entry {
 }
 
 /// What a ray has gathered.
-struct Gathered<const N: usize> {
+struct Gathered<V, const N: usize> {
     light: Light<f32>,
-    largest: Option<[f32; N]>,
+    largest: Option<[V; N]>,
 }
 
 /// Traces rays, one after another.
@@ -175,7 +176,13 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
     }
 
     /// As [`Self::tile`], in the widest instructions that the processor has; their results are the same.
-    fn draw(&mut self, left: u32, top: u32, rows: &mut [[f32; 4]], pixel: &(dyn Fn(&[f32; N]) -> [f32; 4] + Sync)) {
+    fn draw(
+        &mut self,
+        left: u32,
+        top: u32,
+        rows: &mut [[f32; 4]],
+        pixel: &(dyn Fn(&[S::Value; N]) -> [f32; 4] + Sync),
+    ) {
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") {
             #[target_feature(enable = "avx2")]
@@ -184,7 +191,7 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
                 left: u32,
                 top: u32,
                 rows: &mut [[f32; 4]],
-                pixel: &(dyn Fn(&[f32; N]) -> [f32; 4] + Sync),
+                pixel: &(dyn Fn(&[S::Value; N]) -> [f32; 4] + Sync),
             ) {
                 tracer.tile(left, top, rows, pixel);
             }
@@ -197,7 +204,13 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
 
     /// Draws the tile whose upper left pixel is (`left`, `top`) into `rows`, which start with row `top` of the image.
     #[inline(always)]
-    fn tile(&mut self, left: u32, top: u32, rows: &mut [[f32; 4]], pixel: &(dyn Fn(&[f32; N]) -> [f32; 4] + Sync)) {
+    fn tile(
+        &mut self,
+        left: u32,
+        top: u32,
+        rows: &mut [[f32; 4]],
+        pixel: &(dyn Fn(&[S::Value; N]) -> [f32; 4] + Sync),
+    ) {
         let w = self.view.size()[0];
         let (right, bottom) = ((left + TILE).min(w), top + (rows.len() as u32 / w).min(TILE));
         self.find_candidates([left, top], [right, bottom]);
@@ -213,7 +226,7 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
 
     /// Draws one pixel, whose candidates were found.
     #[inline(always)]
-    fn pixel(&mut self, i: u32, j: u32, pixel: &(dyn Fn(&[f32; N]) -> [f32; 4] + Sync)) -> [f32; 4] {
+    fn pixel(&mut self, i: u32, j: u32, pixel: &(dyn Fn(&[S::Value; N]) -> [f32; 4] + Sync)) -> [f32; 4] {
         let gathered = self.trace(i, j);
         match (self.view.blend(), gathered.largest) {
             (Blend::Composite, _) => {
@@ -251,7 +264,7 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
 
     /// Traces the ray of pixel (`i`, `j`).
     #[inline(always)]
-    fn trace(&mut self, i: u32, j: u32) -> Gathered<N> {
+    fn trace(&mut self, i: u32, j: u32) -> Gathered<S::Value, N> {
         let ray = self.view.ray(i, j);
         let Geometry { centre, scale, .. } = *self.geometry;
         let origin = (ray.origin - centre) * scale;
@@ -284,7 +297,7 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
         pixel: DVec2,
         [t_min, t_max]: [f64; 2],
         anyhow: bool,
-        gathered: &mut Gathered<N>,
+        gathered: &mut Gathered<S::Value, N>,
     ) -> bool {
         let (origin, along) = frame.ray();
         self.segments.begin(origin, along);
@@ -333,7 +346,7 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
         frame: &Frame,
         e: usize,
         [t_min, t_max]: [f64; 2],
-        gathered: &mut Gathered<N>,
+        gathered: &mut Gathered<S::Value, N>,
     ) -> Option<[f64; 3]> {
         let Geometry { points, cells, .. } = self.geometry;
         let Entry { t, points: mut ids, mut cell, mut face } = self.entries[e];
@@ -361,7 +374,7 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
                         } else if x == left {
                             back
                         } else {
-                            mix(&front, &back, ((x - entered) / (left - entered)) as f32)
+                            mix(&front, &back, (x - entered) / (left - entered))
                         }
                     };
                     self.gather(at(from), at(to), [from, to], gathered);
@@ -382,12 +395,12 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
 
     /// Whether nothing behind can be seen.
     #[inline(always)]
-    fn is_over(&self, gathered: &Gathered<N>) -> bool {
+    fn is_over(&self, gathered: &Gathered<S::Value, N>) -> bool {
         gathered.light.through < self.segments.least_light()
     }
 
     #[inline(always)]
-    fn gather(&mut self, front: [f32; N], back: [f32; N], t: [f64; 2], gathered: &mut Gathered<N>) {
+    fn gather(&mut self, front: [S::Value; N], back: [S::Value; N], t: [f64; 2], gathered: &mut Gathered<S::Value, N>) {
         if self.view.blend() == Blend::Composite {
             self.segments.add(&front, &back, t, &mut gathered.light);
         } else if front.iter().chain(&back).all(|v| v.is_finite()) {
@@ -401,16 +414,16 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
 
     /// The field at `weights` on the face `ids` of `cell`.
     #[inline(always)]
-    fn value(&self, cell: u32, ids: &[u32; 3], weights: &[f64; 3]) -> [f32; N] {
+    fn value(&self, cell: u32, ids: &[u32; 3], weights: &[f64; 3]) -> [S::Value; N] {
         let corners: [&[f32; N]; 3] = match self.values {
-            Values::Cell(v) => return v[cell as usize],
+            Values::Cell(v) => return v[cell as usize].map(|v| Real::of(v.into())),
             Values::Point(v) => ids.map(|p| &v[p as usize]),
             Values::Corner(v) => {
                 let own = &self.geometry.cells[cell as usize].corners;
                 ids.map(|p| &v[cell as usize][own.iter().position(|&c| c == p).unwrap_or(0)])
             }
         };
-        std::array::from_fn(|k| (0..3).map(|i| f64::from(corners[i][k]) * weights[i]).sum::<f64>() as f32)
+        std::array::from_fn(|k| Real::of((0..3).map(|i| f64::from(corners[i][k]) * weights[i]).sum::<f64>()))
     }
 }
 
@@ -439,6 +452,7 @@ fn ids_before(mut ids: [u32; 3], dropped: usize, left_behind: u32) -> [u32; 3] {
     ids
 }
 
-fn mix<const N: usize>(a: &[f32; N], b: &[f32; N], w: f32) -> [f32; N] {
+fn mix<R: Real, const N: usize>(a: &[R; N], b: &[R; N], w: f64) -> [R; N] {
+    let w = R::of(w);
     std::array::from_fn(|k| a[k] + (b[k] - a[k]) * w)
 }

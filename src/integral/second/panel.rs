@@ -15,12 +15,14 @@ const NODES: usize = 4;
 const DEEPEST: f64 = 1.5;
 /// By how many σ a Gaussian's argument moves in a panel, and by how many radians a sinusoid's, at most.
 const STEP: [f64; 2] = [1.2, 1.5];
-/// By what factor the argument of a power or a logarithm changes in a panel at most.
-const FACTOR: f64 = 6.0;
+/// By what factor the argument of a power or a logarithm changes between the nodes of a panel at most.
+const FACTOR: f64 = 2.0;
 /// By what angle a normal turns in a panel at most; for highlights this over the root of their power.
 const ANGLES: [f64; 2] = [0.35, 1.2];
-/// The shortest panels that are halved, as shares of a segment.
+/// The shortest panels that are halved as they bend, and those that are shortened as they are deep, as shares of a segment.
 const SHORTEST: f64 = 1e-7;
+/// See [`SHORTEST`].
+const THINNEST: f64 = 1e-14;
 /// Transmittance below which f32 tells nothing from nothing.
 const DARK: f32 = 1e-12;
 /// Places of a segment that are one.
@@ -204,15 +206,13 @@ impl Second {
             };
             let nodes = self.rule.nodes.map(|x| self.node(segment, piece, u + h * x));
             let depth: f64 = (0..NODES).map(|i| self.rule.weights[i] * nodes[i].density[3]).sum::<f64>() * h;
-            if h > SHORTEST {
-                if depth > DEEPEST {
-                    h *= (1.0 / depth).clamp(0.01, 0.6);
-                    continue;
-                }
-                if !self.is_tame(segment, &nodes, [u, u + h]) {
-                    h *= 0.5;
-                    continue;
-                }
+            if depth > DEEPEST && h > THINNEST {
+                h *= (1.0 / depth).clamp(0.01, 0.6);
+                continue;
+            }
+            if h > SHORTEST && !self.is_tame(segment, &nodes, [u, u + h]) {
+                h *= 0.5;
+                continue;
             }
             let mut emitted = [0.0; 3];
             for i in 0..NODES {

@@ -3,14 +3,17 @@
 use super::least_light;
 use crate::integral::second::{Scratch, Second, Segment};
 use crate::integral::{Batch, Integral, Light};
+use crate::real::Real;
 use glam::DVec3;
 
 /// What integrates the segments of rays, one ray after another.
 pub(super) trait Segments<const N: usize> {
+    /// What values along a ray are rounded to.
+    type Value: Real;
     /// A ray begins, from `origin` along a direction of length 1, in normalised coordinates.
     fn begin(&mut self, origin: DVec3, along: DVec3);
     /// Takes a segment with these values at its ends, between two places on the ray.
-    fn add(&mut self, front: &[f32; N], back: &[f32; N], t: [f64; 2], light: &mut Light<f32>);
+    fn add(&mut self, front: &[Self::Value; N], back: &[Self::Value; N], t: [f64; 2], light: &mut Light<f32>);
     /// All of the ray is to be in `light`.
     fn end(&mut self, light: &mut Light<f32>);
     /// Transmittance below which nothing behind counts.
@@ -32,6 +35,8 @@ impl<'a> One<'a> {
 }
 
 impl<const N: usize> Segments<N> for One<'_> {
+    type Value = f32;
+
     #[inline(always)]
     fn begin(&mut self, _: DVec3, _: DVec3) {
         self.batch.clear();
@@ -76,15 +81,18 @@ impl<'a> Two<'a> {
 }
 
 impl<const N: usize> Segments<N> for Two<'_> {
+    // The logarithm of the opacity convention tells values apart that are closer than f32 does.
+    type Value = f64;
+
     fn begin(&mut self, origin: DVec3, along: DVec3) {
         (self.origin, self.along) = (origin, along);
     }
 
-    fn add(&mut self, front: &[f32; N], back: &[f32; N], [from, to]: [f64; 2], light: &mut Light<f32>) {
+    fn add(&mut self, front: &[f64; N], back: &[f64; N], [from, to]: [f64; 2], light: &mut Light<f32>) {
         if front.iter().chain(back).all(|v| v.is_finite()) {
             let [values, ends] = [front, back].map(|v| self.second.own([v[0], v[1]]));
-            let vector = |v: &[f32; N]| match v[..] {
-                [_, _, x, y, z] => DVec3::new(x.into(), y.into(), z.into()),
+            let vector = |v: &[f64; N]| match v[..] {
+                [_, _, x, y, z] => DVec3::new(x, y, z),
                 _ => DVec3::ZERO,
             };
             let segment = Segment {
