@@ -1,5 +1,6 @@
-//! Reading meshes from files.
+//! Reading meshes and grids from files.
 
+mod blocks;
 mod data;
 mod input;
 mod join;
@@ -11,7 +12,8 @@ mod unpack;
 mod vtu;
 
 use crate::error::{Error, Result};
-use crate::mesh::{LeftOut, Mesh};
+use crate::grid::Grid;
+use crate::mesh::{Attributes, LeftOut, Mesh};
 use crate::progress::Progress;
 use input::Input;
 use series::Series;
@@ -20,24 +22,18 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// What Halite knows of but does not read: extension, type attribute of the XML file, and what would help.
-const REFUSED: [(&str, &str, &str); 23] = [
+const REFUSED: [(&str, &str, &str); 17] = [
     ("vtm", "vtkMultiBlockDataSet", MULTIBLOCK),
     ("vtmb", "vtkMultiBlockDataSet", MULTIBLOCK),
     ("vtpc", "vtkPartitionedDataSetCollection", MULTIBLOCK),
     ("vtkhdf", "vtkHDF", "a VTKHDF file, which Halite cannot read; save it as .vtu"),
     ("hdf", "HDF", "an HDF5 file, which Halite cannot read; save it as .vtu"),
-    ("vti", "ImageData", STRUCTURED),
-    ("vtr", "RectilinearGrid", STRUCTURED),
-    ("vts", "StructuredGrid", STRUCTURED),
-    ("pvti", "PImageData", STRUCTURED),
     ("vtp", "PolyData", "surfaces without volume; Halite reads unstructured grids (.vtu)"),
-    ("vth", "HierarchicalBoxDataSet", STRUCTURED),
-    ("htg", "HyperTreeGrid", STRUCTURED),
-    ("pvtr", "PRectilinearGrid", STRUCTURED),
-    ("pvts", "PStructuredGrid", STRUCTURED),
+    ("vth", "HierarchicalBoxDataSet", REFINED),
+    ("htg", "HyperTreeGrid", REFINED),
     ("pvtp", "PPolyData", "surfaces without volume; Halite reads unstructured grids (.vtu)"),
     ("vtpd", "vtkPartitionedDataSet", MULTIBLOCK),
-    ("vthb", "vtkOverlappingAMR", STRUCTURED),
+    ("vthb", "vtkOverlappingAMR", REFINED),
     ("ex2", "Exodus", FOREIGN),
     ("exo", "Exodus", FOREIGN),
     ("e", "Exodus", FOREIGN),
@@ -46,16 +42,17 @@ const REFUSED: [(&str, &str, &str); 23] = [
     ("case", "EnSight", FOREIGN),
 ];
 const FOREIGN: &str = "a file of another format, which Halite cannot read; open it in ParaView, save it as .vtu";
-const STRUCTURED: &str =
-    "a structured grid; convert it to an unstructured grid (in ParaView: Append Datasets), save that as .vtu";
+const REFINED: &str =
+    "a tree of refined grids, which Halite cannot read; convert it (in ParaView: Append Datasets), save that as .vtu";
 const MULTIBLOCK: &str =
     "a list of blocks, which Halite cannot read; merge them (in ParaView: Merge Blocks), save that as .vtu";
 
 /// Reads a mesh: the file's grid as it is, nothing welded, dropped or repaired. `progress` is told the share of the
 /// work that is done, in [0, 1], never less than before.
 ///
-/// The content decides: `.vtu` XML of every data mode, uncompressed or packed, or a legacy `.vtk` file; or a list of such
-/// (`.pvtu`, `.pvd`, `.series`). Several pieces become one mesh, with the arrays that all pieces with points (or cells)
+/// The content decides: `.vtu`, `.vti`, `.vtr` or `.vts` XML of every data mode, uncompressed or packed, or a legacy `.vtk`
+/// file; or a list of such (`.pvtu` and so on, `.pvd`, `.series`). Grids without a list of cells become one of voxels or
+/// hexahedra. Several pieces become one mesh, with the arrays that all pieces with points (or cells)
 /// have: of one number type if they agree, as f64 if not. Arrays of strings, and field data, are left out; so are, with a
 /// warning, arrays of points or cells that are not whole, and pieces that are missing. Of several time steps the first is
 /// read. The work is done in the current rayon pool.
@@ -64,6 +61,35 @@ const MULTIBLOCK: &str =
 /// [`Error::File`], [`Error::Malformed`] or [`Error::Unsupported`], naming the file and the place in it.
 pub fn open(path: &Path, progress: &(dyn Fn(f64) + Sync)) -> Result<Mesh> {
     Source::open(path)?.read(0, progress)
+}
+
+/// What a file holds.
+#[derive(Debug, Clone, PartialEq)]
+pub enum DataSet {
+    /// An unstructured grid, or a structured (curvilinear) one, whose cells are hexahedra.
+    Mesh(Mesh),
+    /// Image data, or a rectilinear grid.
+    Grid(Grid),
+}
+
+impl DataSet {
+    /// A mesh of it; of a grid, one of voxels.
+    ///
+    /// # Errors
+    /// As [`Grid::into_mesh`].
+    pub fn into_mesh(self) -> Result<Mesh> {
+        match self {
+            DataSet::Mesh(mesh) => Ok(mesh),
+            DataSet::Grid(grid) => grid.into_mesh(),
+        }
+    }
+
+    fn set_attributes(&mut self, of_points: Attributes, of_cells: Attributes) {
+        match self {
+            DataSet::Mesh(mesh) => mesh.set_attributes(of_points, of_cells),
+            DataSet::Grid(grid) => grid.set_attributes(of_points, of_cells),
+        }
+    }
 }
 
 /// A file, or bytes, that hold a mesh or a list of files of such: what it is and which time steps it has is known,
@@ -135,7 +161,7 @@ impl Source {
                 _ if start.is_empty() => Error::malformed(path, "the file is empty"),
                 Some((_, _, what)) => Error::unsupported(path, format!("this is {what}")),
                 None => {
-                    let what = "this is neither a VTK XML file (.vtu) nor a legacy VTK file (.vtk), and Halite reads no others";
+                    let what = "this is neither a VTK XML file (.vtu, .vti) nor a legacy VTK file (.vtk), and Halite reads no others";
                     Error::malformed(path, what)
                 }
             });
@@ -206,15 +232,23 @@ impl Source {
     /// # Errors
     /// As [`open`]; [`Error::Step`] if there is no such step.
     pub fn read(&self, step: usize, progress: &(dyn Fn(f64) + Sync)) -> Result<Mesh> {
+        validated(&self.input.path, self.read_data_set(step, progress)?.into_mesh())
+    }
+
+    /// As [`Self::read`], but keeps regular and rectilinear grids as they are.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn read_data_set(&self, step: usize, progress: &(dyn Fn(f64) + Sync)) -> Result<DataSet> {
         let step = if step > 0 && step >= self.times().len() { self.step(Time::Step(step))? } else { step };
         progress(0.0);
-        let mesh = match &self.kind {
+        let read = match &self.kind {
             Kind::Xml(grid) => grid.read(step, progress)?,
             Kind::Series(series) => series.read(step, progress)?,
             Kind::Legacy => legacy::read(&self.input)?,
         };
         progress(1.0);
-        Ok(mesh)
+        Ok(read)
     }
 }
 
@@ -234,16 +268,19 @@ fn warn_of_left_out(path: &Path, arrays: &mut Vec<LeftOut>) {
     }
 }
 
-/// [`Error::Unsupported`] for a kind of data set that is not an unstructured grid.
+/// [`Error::Unsupported`] for a kind of data set that is no grid that is read.
 fn refuse(path: &Path, kind: &str) -> Error {
     let known = REFUSED.iter().find(|known| known.1.eq_ignore_ascii_case(kind));
-    let what = known.map_or("a kind that Halite does not read; it reads unstructured grids (.vtu)", |known| known.2);
+    let what = known.map_or(
+        "a kind that Halite does not read; it reads unstructured and structured grids (.vtu, .vti, .vtr, .vts)",
+        |known| known.2,
+    );
     Error::unsupported(path, format!("it holds \"{}\": {what}", kind.escape_debug()))
 }
 
-/// A mesh of parts that were read from a file: if they contradict each other, the file is to blame.
-fn validated(path: &Path, mesh: Result<Mesh>) -> Result<Mesh> {
-    mesh.map_err(|error| match error {
+/// What was made of parts that were read from a file: if they contradict each other, the file is to blame.
+fn validated<T>(path: &Path, made: Result<T>) -> Result<T> {
+    made.map_err(|error| match error {
         Error::Mesh(what) => Error::malformed(path, what),
         other => other,
     })

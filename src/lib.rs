@@ -3,7 +3,8 @@
 //!
 //! The pipeline, stage by stage; an arrow never points back:
 //!
-//! 1. [`io::open`] reads a file into a [`mesh::Mesh`]: the grid as it is, validated once.
+//! 1. [`io::open`] reads a file into a [`mesh::Mesh`]: the grid as it is, validated once; [`io::Source`] also into a
+//!    [`grid::Grid`], where it is regular or rectilinear.
 //! 2. [`mesh::cells`] splits its cells into tetrahedra, [`mesh::faces`] finds their neighbours, [`geometry`] lays both
 //!    out for engines.
 //! 3. [`field::Field`] is the array that is drawn, [`transfer::TransferFunction`] says how.
@@ -22,6 +23,7 @@ pub mod ffi;
 pub mod field;
 pub mod geometry;
 pub mod gpu;
+pub mod grid;
 pub mod host;
 pub mod image;
 pub mod integral;

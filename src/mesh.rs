@@ -57,6 +57,28 @@ impl Values {
         self.len() == 0
     }
 
+    /// The tuples of `components` values with the numbers `at`, one after another, in the same type; zeros where there is
+    /// no such tuple.
+    pub(crate) fn gathered(&self, components: usize, at: &[usize]) -> Values {
+        macro_rules! gather {
+            ($($variant:ident),*) => {
+                match self {
+                    $(Values::$variant(v) => {
+                        let mut all = Vec::with_capacity(at.len() * components);
+                        for t in at {
+                            match v.chunks_exact(components).nth(*t) {
+                                Some(tuple) => all.extend_from_slice(tuple),
+                                None => all.resize(all.len() + components, Default::default()),
+                            }
+                        }
+                        Values::$variant(all)
+                    })*
+                }
+            };
+        }
+        gather!(I8, U8, I16, U16, I32, U32, I64, U64, F32, F64)
+    }
+
     /// Value `i` as f64.
     ///
     /// # Panics
@@ -320,7 +342,8 @@ impl Mesh {
     }
 }
 
-fn check_array(kind: &str, a: &Array, count: usize) -> Result<()> {
+/// Checks that an array of points or cells, which `kind` says, has values for `count` of them.
+pub(crate) fn check_array(kind: &str, a: &Array, count: usize) -> Result<()> {
     if a.components > 0 && count.checked_mul(a.components) == Some(a.values.len()) {
         return Ok(());
     }

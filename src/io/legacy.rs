@@ -8,18 +8,20 @@
 mod data;
 mod parsed;
 mod scan;
+mod structured;
 
 use super::input::Input;
 use super::vtu::renumber;
-use super::{MOST_WARNINGS, refuse, validated, warn_of_left_out};
+use super::{DataSet, MOST_WARNINGS, refuse, validated, warn_of_left_out};
 use crate::error::{Error, Result};
 use crate::mesh::{Array, Attributes, Cells, Mesh, POLYHEDRON, Polyhedra, Values};
 use glam::DVec3;
 use scan::{Fault, Scanner, Type};
 use std::path::Path;
+use structured::{Axes, Kind};
 
-/// Reads the unstructured grid in a legacy file.
-pub(super) fn read(input: &Input) -> Result<Mesh> {
+/// Reads the grid in a legacy file.
+pub(super) fn read(input: &Input) -> Result<DataSet> {
     let path = &input.path;
     let bytes = input.bytes().map_err(|e| Error::file(path, e))?;
     let mut scanner = Scanner::new(&bytes);
@@ -38,9 +40,9 @@ pub(super) fn read(input: &Input) -> Result<Mesh> {
     let kind = if scanner.pass("DATASET") { scanner.word("the kind of data set").ok() } else { None };
     match kind.map(|kind| kind.to_ascii_uppercase()).as_deref() {
         Some("UNSTRUCTURED_GRID") => {}
-        Some("STRUCTURED_POINTS") => return Err(refuse(path, "ImageData")),
-        Some("STRUCTURED_GRID") => return Err(refuse(path, "StructuredGrid")),
-        Some("RECTILINEAR_GRID") => return Err(refuse(path, "RectilinearGrid")),
+        Some("STRUCTURED_POINTS") => return structured::read(path, &mut scanner, Kind::Image),
+        Some("STRUCTURED_GRID") => return structured::read(path, &mut scanner, Kind::Structured),
+        Some("RECTILINEAR_GRID") => return structured::read(path, &mut scanner, Kind::Rectilinear),
         Some("POLYDATA") => return Err(refuse(path, "PolyData")),
         Some(other) => return Err(refuse(path, other)),
         None => return Err(Error::malformed(path, "there is no data set in it")),
@@ -49,7 +51,7 @@ pub(super) fn read(input: &Input) -> Result<Mesh> {
     if let Err(what) = parts.scan(&mut scanner) {
         parts = Parts::parsed(&bytes).ok_or_else(|| Error::malformed(path, what))?;
     }
-    parts.mesh(path, version)
+    parts.mesh(path, version).map(DataSet::Mesh)
 }
 
 /// What was read so far.
@@ -68,6 +70,8 @@ struct Parts {
     counts: Vec<(usize, usize)>,
     /// What else was passed over.
     notes: Vec<String>,
+    /// What a grid that lists no cells says of its axes.
+    axes: Option<Axes>,
 }
 
 /// What the sections are called that have data of points (0) and of cells (1).
@@ -96,6 +100,9 @@ impl Parts {
                     if self.wrong_count().is_some() {
                         return Ok(());
                     }
+                }
+                _ if self.axes.as_mut().is_some_and(|axes| axes.has(&keyword)) => {
+                    self.axis(from, &keyword).map_err(named)?;
                 }
                 _ => self.data(from, &keyword, at),
             }
@@ -181,7 +188,10 @@ impl Parts {
 
     /// Says which section of data has not as many tuples as there are points or cells.
     fn wrong_count(&self) -> Option<String> {
-        let there = [self.points.as_ref().map(Vec::len), self.types.as_ref().map(Vec::len)];
+        let there = match &self.axes {
+            Some(axes) => axes.counts(),
+            None => [self.points.as_ref().map(Vec::len), self.types.as_ref().map(Vec::len)],
+        };
         let wrong = |(of, count): &&(usize, usize)| there[*of].is_some_and(|there| there != *count);
         let (of, count) = self.counts.iter().find(wrong)?;
         let (section, what) = (SECTIONS[*of], ["points", "cells"][*of]);
@@ -216,15 +226,19 @@ impl Parts {
         let mesh = Mesh::new(points, cells, of_points, of_cells);
         let mesh = mesh.and_then(|mesh| if let Some(p) = polyhedra { mesh.with_polyhedra(p) } else { Ok(mesh) });
         let mut mesh = validated(path, mesh)?;
-        let [mut of_points, mut of_cells] = self.attributes;
-        for note in self.notes.iter().take(MOST_WARNINGS) {
-            tracing::warn!("{}: {note}", path.display());
-        }
-        warn_of_left_out(path, &mut of_points.left_out);
-        warn_of_left_out(path, &mut of_cells.left_out);
+        let [of_points, of_cells] = told(path, self.attributes, &self.notes);
         mesh.set_attributes(of_points, of_cells);
         Ok(mesh)
     }
+}
+
+/// What is known of arrays, after the log has it.
+fn told(path: &Path, mut attributes: [Attributes; 2], notes: &[String]) -> [Attributes; 2] {
+    for note in notes.iter().take(MOST_WARNINGS) {
+        tracing::warn!("{}: {note}", path.display());
+    }
+    attributes.iter_mut().for_each(|known| warn_of_left_out(path, &mut known.left_out));
+    attributes
 }
 
 /// In these files a polyhedron has no points, but its faces: their number, and for each the number of its points, and

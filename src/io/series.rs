@@ -1,9 +1,8 @@
 //! Files that list others: each for a time, or several that make one mesh together.
 
 use super::input::{Input, Place, find};
-use super::{Source, join};
+use super::{DataSet, Source, join, validated};
 use crate::error::{Error, Result};
-use crate::mesh::Mesh;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -64,13 +63,13 @@ impl Series {
 
     /// Reads the files of a step, counted from 0. Those that hold no grid, or are missing, are left out if there are
     /// others.
-    pub(super) fn read(&self, step: usize, tell: &(dyn Fn(f64) + Sync)) -> Result<Mesh> {
+    pub(super) fn read(&self, step: usize, tell: &(dyn Fn(f64) + Sync)) -> Result<DataSet> {
         let files = self.files.get(step).map_or(&[][..], Vec::as_slice);
         let (mut parts, mut fault) = (vec![], None);
         for (i, name) in files.iter().enumerate() {
             let share = |done: f64| tell((i as f64 + done) / files.len() as f64);
             match self.part(name, &share) {
-                Ok(mesh) => parts.push(mesh),
+                Ok(part) => parts.push(part),
                 Err(error @ (Error::Unsupported { .. } | Error::File { .. })) => {
                     tracing::warn!("{}: a file that it lists is left out: {error}", self.path.display());
                     fault = Some(error);
@@ -80,11 +79,15 @@ impl Series {
         }
         match (parts.is_empty(), fault) {
             (true, Some(fault)) => Err(fault),
-            _ => join::joined(&self.path, parts),
+            _ if parts.len() == 1 => Ok(parts.swap_remove(0)),
+            _ => {
+                let meshes = parts.into_iter().map(|part| validated(&self.path, part.into_mesh()));
+                join::joined(&self.path, meshes.collect::<Result<_>>()?).map(DataSet::Mesh)
+            }
         }
     }
 
-    fn part(&self, name: &str, tell: &(dyn Fn(f64) + Sync)) -> Result<Mesh> {
+    fn part(&self, name: &str, tell: &(dyn Fn(f64) + Sync)) -> Result<DataSet> {
         let path = match find(&self.path, name) {
             Place::There(path) => path,
             Place::Moved(path) => {
@@ -99,6 +102,6 @@ impl Series {
             let what = format!("it lists {}, which is such a list itself", path.display());
             return Err(Error::malformed(&self.path, what));
         }
-        source.read(0, tell)
+        source.read_data_set(0, tell)
     }
 }

@@ -1,21 +1,27 @@
-//! VTK XML files of unstructured grids: `.vtu`, and `.pvtu`, which lists such; `.pvd`, which lists any.
+//! VTK XML files of grids: `.vtu`, and `.pvtu`, which lists such; likewise `.vti`, `.vtr` and `.vts`; `.pvd`, which lists
+//! any.
 //!
-//! `head` reads the XML up to the numbers: which pieces and arrays there are, and where. `grid` makes one mesh of all
-//! pieces: points and data; `topology` the cells.
+//! `head` reads the XML up to the numbers: which pieces and arrays there are, and where; `place` where pieces of grids are
+//! whose points are counted along axes. `grid` makes one mesh of all pieces: points and data; `topology` the cells;
+//! `structured` one grid of pieces along axes.
 
 mod grid;
 mod head;
+mod place;
+mod structured;
 mod topology;
 
 pub(super) use topology::renumber;
 
 use super::input::{Input, Place, find};
 use super::series::Series;
-use super::{Progress, warn_of_left_out};
+use super::{DataSet, Progress, warn_of_left_out};
 use crate::error::{Error, Result};
-use crate::mesh::{Attributes, Mesh};
+use crate::grid::Lattice;
+use crate::mesh::Attributes;
 use grid::Grid;
 use head::{Head, Piece};
+use place::Kind;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering::Relaxed;
@@ -26,9 +32,12 @@ pub(super) enum Opened {
     Collection(Series),
 }
 
-/// An unstructured grid in a file, or in several; nothing but their heads is read yet.
+/// A grid in a file, or in several; nothing but their heads is read yet.
 pub(super) struct Document {
     path: PathBuf,
+    kind: Kind,
+    /// Where image data is.
+    lattice: Lattice,
     heads: Vec<Head>,
     /// The numbers of the time steps in the file, and the time of each; none if it tells none apart.
     steps: Vec<usize>,
@@ -47,11 +56,15 @@ pub(super) fn open(input: &Input) -> Result<Opened> {
     if head.is_list {
         let sources = std::mem::take(&mut head.sources);
         for piece in pieces(path, &sources)? {
-            let head = Head::read(&Input::file(&piece))?;
-            if head.is_list || head.collection.is_some() {
+            let own = Head::read(&Input::file(&piece))?;
+            if own.is_list || own.collection.is_some() {
                 return Err(Error::malformed(path, format!("it lists {}, which is a list itself", piece.display())));
             }
-            heads.push(head);
+            if own.kind != head.kind {
+                let (piece, is, not) = (piece.display(), own.kind.name(), head.kind.name());
+                return Err(Error::malformed(path, format!("it lists {piece}, which holds \"{is}\", not \"{not}\"")));
+            }
+            heads.push(own);
         }
     }
     heads.insert(0, head);
@@ -64,7 +77,9 @@ pub(super) fn open(input: &Input) -> Result<Opened> {
         count => (0..count).collect(),
     };
     let times = if times.is_empty() { steps.iter().map(|step| *step as f64).collect() } else { times };
-    Ok(Opened::Grid(Document { path: path.clone(), heads, steps, times }))
+    let (kind, first) = (heads[0].kind, heads.iter().find(|head| !head.pieces.is_empty()));
+    let lattice = first.map_or_else(Lattice::default, |head| head.lattice);
+    Ok(Opened::Grid(Document { path: path.clone(), kind, lattice, heads, steps, times }))
 }
 
 /// The files that a list names, as far as they are there.
@@ -102,7 +117,7 @@ impl Document {
     }
 
     /// Reads the grid at a step, counted from 0.
-    pub(super) fn read(&self, step: usize, tell: &(dyn Fn(f64) + Sync)) -> Result<Mesh> {
+    pub(super) fn read(&self, step: usize, tell: &(dyn Fn(f64) + Sync)) -> Result<DataSet> {
         let step = self.steps.get(step).copied().unwrap_or(step);
         let (mut stores, mut pieces) = (vec![], vec![]);
         let mut attributes: [Attributes; 2] = Default::default();
@@ -121,13 +136,17 @@ impl Document {
         }
         let expected = pieces.iter().map(Piece::expected).sum::<f64>().max(1.0);
         let progress = Progress::new(tell, expected);
-        let (mut mesh, left_out) = Grid { path: &self.path, stores, pieces, progress }.mesh()?;
+        let grid = Grid { path: &self.path, stores, pieces, progress };
+        let (mut read, left_out) = match self.kind {
+            Kind::Unstructured => grid.mesh().map(|(mesh, left_out)| (DataSet::Mesh(mesh), left_out))?,
+            kind => grid.structured(kind, self.lattice)?,
+        };
         for (all, more) in attributes.iter_mut().zip(left_out) {
             all.left_out.extend(more);
             warn_of_left_out(&self.path, &mut all.left_out);
         }
         let [of_points, of_cells] = attributes;
-        mesh.set_attributes(of_points, of_cells);
-        Ok(mesh)
+        read.set_attributes(of_points, of_cells);
+        Ok(read)
     }
 }

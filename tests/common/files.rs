@@ -134,9 +134,32 @@ pub(crate) fn piece() -> Piece {
     }
 }
 
+/// A piece of any kind of grid to be written: the attributes of its tag, and the arrays of each section.
+pub(crate) type Written = (String, Vec<(&'static str, Vec<Array>)>);
+
 pub(crate) fn write(style: Style, pieces: &[Piece]) -> Vec<u8> {
+    let written = |piece: &Piece| {
+        let (points, cells) = (piece.points.len() / 3, piece.types.len());
+        let topology = vec![
+            array("connectivity", 1, piece.connectivity.clone()),
+            array("offsets", 1, piece.offsets.clone()),
+            array("types", 1, piece.types.clone()),
+        ];
+        let sections = vec![
+            ("PointData", piece.point_data.clone()),
+            ("CellData", piece.cell_data.clone()),
+            ("Points", vec![array("Points", 3, piece.points.clone())]),
+            ("Cells", topology),
+        ];
+        (format!("NumberOfPoints=\"{points}\" NumberOfCells=\"{cells}\""), sections)
+    };
+    write_grid(style, "UnstructuredGrid", "", &pieces.iter().map(written).collect::<Vec<_>>())
+}
+
+/// A file of a `kind` of grid whose element has these `attributes`.
+pub(crate) fn write_grid(style: Style, kind: &str, attributes: &str, pieces: &[Written]) -> Vec<u8> {
     let mut appended: Vec<u8> = Vec::new();
-    let mut head = String::from("<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"0.1\"");
+    let mut head = format!("<?xml version=\"1.0\"?>\n<VTKFile type=\"{kind}\" version=\"0.1\"");
     write!(head, " byte_order=\"{}Endian\"", if style.big_endian { "Big" } else { "Little" }).unwrap();
     write!(head, " header_type=\"UInt{}\"", if style.wide { 64 } else { 32 }).unwrap();
     if style.block.is_some() {
@@ -147,25 +170,14 @@ pub(crate) fn write(style: Style, pieces: &[Piece]) -> Vec<u8> {
         };
         write!(head, " compressor=\"vtk{name}DataCompressor\"").unwrap();
     }
-    head += ">\n<UnstructuredGrid>\n";
-    for piece in pieces {
-        let (points, cells) = (piece.points.len() / 3, piece.types.len());
-        writeln!(head, "<Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{cells}\">").unwrap();
-        let topology = vec![
-            array("connectivity", 1, piece.connectivity.clone()),
-            array("offsets", 1, piece.offsets.clone()),
-            array("types", 1, piece.types.clone()),
-        ];
-        let sections = [
-            ("PointData", piece.point_data.clone()),
-            ("CellData", piece.cell_data.clone()),
-            ("Points", vec![array("Points", 3, piece.points.clone())]),
-            ("Cells", topology),
-        ];
+    let space = if attributes.is_empty() { "" } else { " " };
+    write!(head, ">\n<{kind}{space}{attributes}>\n").unwrap();
+    for (attributes, sections) in pieces {
+        writeln!(head, "<Piece {attributes}>").unwrap();
         for (section, arrays) in sections {
             writeln!(head, "<{section}>").unwrap();
             for Array { name, components, values } in arrays {
-                let (kind, bytes, text) = told(&values, style.big_endian);
+                let (kind, bytes, text) = told(values, style.big_endian);
                 write!(head, "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" ")
                     .unwrap();
                 match style.mode {
@@ -184,7 +196,7 @@ pub(crate) fn write(style: Style, pieces: &[Piece]) -> Vec<u8> {
         }
         head += "</Piece>\n";
     }
-    head += "</UnstructuredGrid>\n";
+    writeln!(head, "</{kind}>").unwrap();
     let mut file = head.into_bytes();
     if matches!(style.mode, Mode::AppendedRaw | Mode::AppendedBase64) {
         let encoding = if style.mode == Mode::AppendedRaw { "raw" } else { "base64" };

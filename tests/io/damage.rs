@@ -1,7 +1,7 @@
 //! What is damaged, or not read, is refused by name; files of other programs.
 
 use super::files::{Codec, LEGACY, Mode, PLAIN, Piece, Random, Style, ascii, mutated, piece, write};
-use super::shared::meshes_in;
+use super::shared::{files_in, meshes_in};
 use super::{assert_holds, malformed, read, read_as};
 use halite::Error;
 use halite::mesh::Values;
@@ -131,15 +131,14 @@ fn what_is_not_read_is_refused_by_name() {
     assert!(what.contains("vtkZstdDataCompressor") && what.contains("array \""), "{what}");
     let unused = ascii(&[piece()]).replace("UInt32\">", "UInt32\" compressor=\"vtkZstdDataCompressor\">");
     assert_holds(&read(unused.as_bytes()).unwrap(), &piece(), "a compressor that nothing uses");
-    for kind in ["ImageData", "PolyData", "vtkMultiBlockDataSet", "Nonsense"] {
+    for kind in ["HyperTreeGrid", "PolyData", "vtkMultiBlockDataSet", "Nonsense"] {
         assert!(refused("mesh.vtu", format!("<VTKFile type='{kind}'/>").as_bytes()).contains(kind));
     }
-    for extension in ["vti", "vtm", "vtkhdf", "VTP"] {
+    for extension in ["htg", "vtm", "vtkhdf", "VTP"] {
         assert!(refused(&format!("mesh.{extension}"), b"\x89HDF").starts_with("this is "));
     }
-    let points = "DATASET STRUCTURED_POINTS\nDIMENSIONS 1 1 1\nORIGIN 0 0 0\nSPACING 1 1 1\n";
-    let what = refused("mesh.vtk", format!("# vtk DataFile Version 3.0\nx\nASCII\n{points}").as_bytes());
-    assert!(what.contains("ImageData"), "{what}");
+    let what = refused("mesh.vtk", b"# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 0 float\n");
+    assert!(what.contains("PolyData"), "{what}");
 }
 
 #[test]
@@ -151,7 +150,7 @@ fn damage_never_panics() {
         .flat_map(|mode| {
             [PLAIN, Style { block: Some(64), wide: true, ..PLAIN }].map(|style| Style { mode: *mode, ..style })
         })
-        .map(|style| write(style, &[piece(), piece()]))
+        .flat_map(|style| [vec![write(style, &[piece(), piece()])], super::grids::seeds(style)].concat())
         .chain([LEGACY.as_bytes().to_vec()])
         .collect();
     let folder = tempfile::tempdir().unwrap();
@@ -171,7 +170,8 @@ fn damage_never_panics() {
 fn files_of_other_programs() {
     let folders =
         ["data/corner/gen", "data/corner/real", "data/corner/writers", "data/tools", "data/papers", "reference/meshes"];
-    for path in folders.iter().flat_map(|folder| meshes_in(folder)) {
+    let all = ["vtu", "pvtu", "vti", "vtr", "vts"];
+    for path in folders.iter().flat_map(|folder| files_in(folder, &all)) {
         // One was cut short, the other lists a file that is not there.
         let broken =
             ["petsc_tet4_mat_vertex_t10.vtu", "dolfinx_hex_p1000000.pvtu"].iter().any(|name| path.ends_with(name));

@@ -6,6 +6,7 @@ mod damage;
 mod encodings;
 #[path = "../common/files.rs"]
 mod files;
+mod grids;
 mod left_out;
 mod legacy;
 mod pieces;

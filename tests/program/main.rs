@@ -143,7 +143,8 @@ fn failures_are_one_line() {
     place.fails("info none.vtu", &["none.vtu"]);
     place.fails("render . --out x.png", &["halite: .: "]);
     for (name, text, part) in [
-        ("a.vti", "<VTKFile type='ImageData'/>", "a structured grid"),
+        ("a.vti", "<VTKFile type='ImageData'/>", "there is no <Piece>"),
+        ("a.htg", "<VTKFile type='HyperTreeGrid'/>", "refined"),
         ("a.pvd", "<VTKFile type='Collection'/>", "it lists no file"),
         ("a.vtm", "<VTKFile type='vtkMultiBlockDataSet'/>", "Merge Blocks"),
         ("a.vtkhdf", "\u{7f}HDF", "a VTKHDF file"),

@@ -26,8 +26,13 @@ def reader_of(path):
         if VERSION < (9, 4) and b"face_connectivity" in file.read():
             return None
     if start.lower().startswith(b"# vtk datafile"):
-        return vtk.vtkUnstructuredGridReader()
-    return vtk.vtkXMLPUnstructuredGridReader() if path.endswith(".pvtu") else vtk.vtkXMLUnstructuredGridReader()
+        kinds = {b"STRUCTURED_POINTS": "StructuredPoints", b"RECTILINEAR_GRID": "RectilinearGrid", b"STRUCTURED_GRID": "StructuredGrid"}
+        words = start.split()
+        kind = words[words.index(b"DATASET") + 1] if b"DATASET" in words else b""
+        return getattr(vtk, "vtk" + kinds.get(kind, "UnstructuredGrid") + "Reader")()
+    kinds = {"vtu": "UnstructuredGrid", "vti": "ImageData", "vtr": "RectilinearGrid", "vts": "StructuredGrid"}
+    extension = os.path.splitext(path)[1][1:]
+    return getattr(vtk, "vtkXML" + ("P" if extension[0] == "p" else "") + kinds[extension[-3:]] + "Reader")()
 
 
 def dump(out, path):
@@ -41,24 +46,30 @@ def dump(out, path):
     errors = []
     reader.AddObserver("ErrorEvent", lambda *_: errors.append(1))
     reader.SetFileName(path)
-    if reader.IsA("vtkUnstructuredGridReader"):
+    if reader.IsA("vtkDataReader"):
         for what in ("Scalars", "Vectors", "Normals", "Tensors", "ColorScalars", "TCoords", "Fields"):
             getattr(reader, "ReadAll" + what + "On")()
     reader.Update()
     grid = reader.GetOutput()
     if errors:
         return put(["error"])
-    points = grid.GetPoints()
-    if points is not None and points.GetNumberOfPoints():
-        kind, data = numbers(points.GetData())
-        put(["points", kind], data)
-    cells = grid.GetCells()
+    if isinstance(grid, vtk.vtkPointSet):
+        points = grid.GetPoints()
+        if points is not None and points.GetNumberOfPoints():
+            kind, data = numbers(points.GetData())
+            put(["points", kind], data)
+    else:
+        points = vtk.vtkDoubleArray()
+        for i in range(grid.GetNumberOfPoints()):
+            for c in grid.GetPoint(i):
+                points.InsertNextValue(c)
+        put(["points", "f8"], numbers(points)[1])
     ids, types, ends, faces = vtk.vtkIdList(), vtk.vtkUnsignedCharArray(), vtk.vtkIdTypeArray(), vtk.vtkIdTypeArray()
     connectivity = vtk.vtkIdTypeArray()
     for c in range(grid.GetNumberOfCells()):
         vtk_type = grid.GetCellType(c)
         types.InsertNextValue(vtk_type)
-        cells.GetCellAtId(c, ids)
+        grid.GetCellPoints(c, ids)
         for i in range(ids.GetNumberOfIds()):
             connectivity.InsertNextValue(ids.GetId(i))
         ends.InsertNextValue(connectivity.GetNumberOfValues())
@@ -156,6 +167,75 @@ def without(grid, name):
     return copy
 
 
+def blocks():
+    """A grid of each kind that lists no cells, with the arrays of an unstructured one of as many points and cells."""
+    image, uneven, bent = vtk.vtkImageData(), vtk.vtkRectilinearGrid(), vtk.vtkStructuredGrid()
+    extent = (-2, 1, 3, 5, 7, 8)
+    size = [extent[2 * a + 1] - extent[2 * a] + 1 for a in range(3)]
+    image.SetExtent(extent)
+    image.SetOrigin(1.5, -2, 1e3)
+    image.SetSpacing(0.1, 2, 0.3)
+    image.SetDirectionMatrix(0.6, -0.8, 0, 0.8, 0.6, 0, 0, 0, 1)
+    uneven.SetExtent(extent)
+    for a, name in enumerate("XYZ"):
+        axis = vtk.vtkDoubleArray()
+        for i in range(size[a]):
+            axis.InsertNextValue((1 + 0.1 * i * i) * (-1 if a == 1 else 1) / 3)
+        getattr(uneven, f"Set{name}Coordinates")(axis)
+    points = vtk.vtkPoints()
+    for k in range(size[2]):
+        for j in range(size[1]):
+            for i in range(size[0]):
+                points.InsertNextPoint(i + 0.1 * j * k, j, k + 0.2 * i)
+    bent.SetExtent(extent)
+    bent.SetPoints(points)
+    for grid in (image, uneven, bent):
+        for data, count in ((grid.GetPointData(), grid.GetNumberOfPoints()), (grid.GetCellData(), grid.GetNumberOfCells())):
+            for name in ("SignedChar", "UnsignedShort", "Int", "LongLong", "Float", "Double"):
+                array = getattr(vtk, "vtk" + name + "Array")()
+                array.SetName(name)
+                array.SetNumberOfComponents(3 if name == "Double" else 1)
+                array.SetNumberOfTuples(count)
+                for i in range(array.GetNumberOfValues()):
+                    array.SetValue(i, (i * 37 % 101) + (0.1 if name in ("Float", "Double") else 0))
+                data.AddArray(array)
+            data.SetActiveScalars("Float")
+    return {"ImageData": image, "RectilinearGrid": uneven, "StructuredGrid": bent}
+
+
+def write_blocks(folder):
+    extensions = {"ImageData": "vti", "RectilinearGrid": "vtr", "StructuredGrid": "vts"}
+    for kind, grid in blocks().items():
+        for mode, compressor in (("Ascii", None), ("Binary", "ZLib"), ("Appended", None), ("Appended", "LZ4")):
+            writer = getattr(vtk, f"vtkXML{kind}Writer")()
+            writer.SetInputData(grid)
+            writer.SetFileName(os.path.join(folder, f"{kind}_{mode}_{compressor}.{extensions[kind]}"))
+            getattr(writer, "SetDataModeTo" + mode)()
+            writer.SetEncodeAppendedData(compressor is not None)
+            writer.SetCompressor(getattr(vtk, f"vtk{compressor}DataCompressor")() if compressor else None)
+            writer.Write()
+        for binary in (0, 1):
+            writer = getattr(vtk, f"vtk{'StructuredPoints' if kind == 'ImageData' else kind}Writer")()
+            straight = grid
+            if kind == "ImageData":
+                # Such files know no directions.
+                straight = vtk.vtkImageData()
+                straight.DeepCopy(grid)
+                straight.SetDirectionMatrix(1, 0, 0, 0, 1, 0, 0, 0, 1)
+            writer.SetInputData(straight)
+            writer.SetFileName(os.path.join(folder, f"{kind}_{binary}.vtk"))
+            (writer.SetFileTypeToBinary if binary else writer.SetFileTypeToASCII)()
+            writer.Write()
+        writer = getattr(vtk, f"vtkXMLP{kind}Writer")()
+        # Lists of images tell no directions.
+        writer.SetInputData(straight if kind == "ImageData" else grid)
+        writer.SetFileName(os.path.join(folder, f"{kind}.p{extensions[kind]}"))
+        writer.SetNumberOfPieces(3)
+        writer.SetStartPiece(0)
+        writer.SetEndPiece(2)
+        writer.Write()
+
+
 LINEAR = [(10, 1), (12, 1), (13, 1), (14, 1)]
 CURVED = [(24, 2), (25, 2), (26, 2), (27, 2)] + [(t, o) for t in (71, 72, 73, 78, 79, 80) for o in (1, 2, 3, 5)]
 
@@ -202,6 +282,7 @@ if __name__ == "__main__":
     vtk.vtkObject.GlobalWarningDisplayOff()
     if sys.argv[1] == "write":
         write(sys.argv[2])
+        write_blocks(sys.argv[2])
     else:
         with open(sys.argv[2], "wb") as out:
             for path in sys.argv[3:]:

@@ -1,9 +1,11 @@
 use crate::{input, output, parse, progress};
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::Args;
 use halite::field::Association;
 use halite::geometry::Geometry;
 use halite::geometry::contacts::Contacts;
+use halite::grid::Grid;
+use halite::io::DataSet;
 use halite::mesh::cells::{self, Listed, Tetrahedra};
 use halite::mesh::faces::Faces;
 use halite::mesh::{Array, Attributes, LeftOut, Mesh, Role, Values};
@@ -35,9 +37,19 @@ pub(crate) fn run(options: &Options) -> Result<()> {
     if let Some(path) = &options.mesh {
         let source = input::source(path)?;
         let step = options.time.map_or(Ok(0), |time| source.step(time))?;
-        let mesh = progress::during("reading", |p| source.read(step, p))?;
+        let read = progress::during("reading", |p| source.read_data_set(step, p))?;
         let name = if input::is_standard(path) { "standard input".to_owned() } else { path.display().to_string() };
-        describe(&mut text, &name, &mesh, (source.times(), step))?;
+        let mesh = match read {
+            DataSet::Grid(grid) => {
+                describe_grid(&mut text, &name, &grid)?;
+                grid.into_mesh().with_context(|| name.clone())?
+            }
+            DataSet::Mesh(mesh) => {
+                writeln!(text, "{name}: {} cells, {} points", mesh.cells().len(), mesh.points().len())?;
+                mesh
+            }
+        };
+        describe(&mut text, &mesh, (source.times(), step))?;
     } else {
         list_devices(&mut text)?;
     }
@@ -99,8 +111,24 @@ fn list_arrays(out: &mut String, what: &str, arrays: &[Array], known: &Attribute
     Ok(())
 }
 
-fn describe(out: &mut String, name: &str, mesh: &Mesh, (times, step): (&[f64], usize)) -> Result<()> {
-    writeln!(out, "{name}: {} cells, {} points", mesh.cells().len(), mesh.points().len())?;
+/// What a grid is by its axes.
+fn describe_grid(out: &mut String, name: &str, grid: &Grid) -> Result<()> {
+    let kind = if grid.is_regular() { "image data" } else { "rectilinear grid" };
+    let ([x, y, z], cells) = (grid.size(), grid.cell_count());
+    writeln!(out, "{name}: {kind}, {cells} cells, {x} x {y} x {z} points")?;
+    if let Some(spacing) = grid.spacing() {
+        writeln!(out, "  spacing  {} {} {}", short(spacing.x), short(spacing.y), short(spacing.z))?;
+    }
+    let direction = grid.direction();
+    if direction != glam::DMat3::IDENTITY {
+        let axes = [direction.x_axis, direction.y_axis, direction.z_axis];
+        let axes = axes.map(|d| format!("{} {} {}", short(d.x), short(d.y), short(d.z)));
+        writeln!(out, "  axes along  {}", axes.join("   "))?;
+    }
+    Ok(())
+}
+
+fn describe(out: &mut String, mesh: &Mesh, (times, step): (&[f64], usize)) -> Result<()> {
     let finite = mesh.points().iter().filter(|p| p.is_finite());
     let (lo, hi) =
         finite.clone().fold((glam::DVec3::INFINITY, glam::DVec3::NEG_INFINITY), |(lo, hi), &p| (lo.min(p), hi.max(p)));

@@ -17,10 +17,15 @@ pub(super) struct Scanner<'a> {
 }
 
 /// The keywords that sections start with, and what follows them on the line: words, counts (`n`) and types (`t`).
-const SECTIONS: [(&str, &str); 18] = [
+const SECTIONS: [(&str, &str); 23] = [
     ("POINTS", "nt"),
     ("CELLS", "nn"),
     ("CELL_TYPES", "n"),
+    ("DIMENSIONS", "nnn"),
+    ("X_COORDINATES", "nt"),
+    ("Y_COORDINATES", "nt"),
+    ("Z_COORDINATES", "nt"),
+    ("EXTENT", "wwwwww"),
     ("POINT_DATA", "n"),
     ("CELL_DATA", "n"),
     ("FIELD", "wn"),

@@ -21,11 +21,14 @@ pub(super) struct Grid<'a> {
 }
 
 /// The arrays of points or cells, and those that had to be left out.
-type Data = (Vec<Array>, Vec<LeftOut>);
+pub(super) type Data = (Vec<Array>, Vec<LeftOut>);
+
+/// Which arrays of points and of cells were left out.
+pub(super) type LeftOutBoth = [Vec<LeftOut>; 2];
 
 impl Grid<'_> {
     /// Reads the arrays, and makes one mesh of all pieces. Also says which arrays of points and of cells it left out.
-    pub(super) fn mesh(&self) -> Result<(Mesh, [Vec<LeftOut>; 2])> {
+    pub(super) fn mesh(&self) -> Result<(Mesh, LeftOutBoth)> {
         let points = self.pieces.iter().fold(0u64, |sum, piece| sum.saturating_add(piece.points));
         if points >= u64::from(u32::MAX) {
             let what = format!("{points} points are more than Halite can index (2^32 - 2)");
@@ -52,7 +55,7 @@ impl Grid<'_> {
         Error::malformed(&self.store(piece).input.path, what)
     }
 
-    fn points(&self) -> Result<Vec<DVec3>> {
+    pub(super) fn points(&self) -> Result<Vec<DVec3>> {
         let read = |(i, piece): (usize, &Piece)| {
             let fail = |what: &str| self.malformed(piece, format!("the Points of piece {i} {what}"));
             match piece.arrays(Section::Points).first() {
@@ -95,7 +98,7 @@ impl Grid<'_> {
     }
 
     /// Reads numbers of any type as f64.
-    fn floats(&self, piece: &Piece, array: &DataArray, tuples: u64) -> Result<Vec<f64>> {
+    pub(super) fn floats(&self, piece: &Piece, array: &DataArray, tuples: u64) -> Result<Vec<f64>> {
         let count = tuples.saturating_mul(array.components as u64);
         self.store(piece).array(array)?.read(count, &self.progress, &|_, numbers, out| {
             let out = bytemuck::cast_slice_mut::<u8, f64>(out);
@@ -122,7 +125,7 @@ impl Grid<'_> {
 
     /// The arrays of point or cell data that all pieces have, pieces with no points (or cells) aside, as far as they are
     /// whole.
-    fn data(&self, section: Section) -> Result<Data> {
+    pub(super) fn data(&self, section: Section) -> Result<Data> {
         let filled: Vec<&Piece> = self.pieces.iter().filter(|piece| piece.tuples(section) > 0).collect();
         let filled = if filled.is_empty() { self.pieces.iter().take(1).collect() } else { filled };
         let found: Vec<HashMap<Key<'_>, &DataArray>> =

@@ -1,9 +1,12 @@
 //! The head of a file: which pieces and arrays it has, and where.
 
+use super::place::Kind;
 use crate::error::{Error, Result};
+use crate::grid::Lattice;
+use crate::io::blocks::Block;
 use crate::io::data::{Appended, Data, DataArray, Store};
 use crate::io::input::{Input, Opened};
-use crate::io::number::Kind;
+use crate::io::number::Kind as NumberKind;
 use crate::io::refuse;
 use crate::mesh::{Attributes, LeftOut, Role};
 use quick_xml::Reader;
@@ -20,11 +23,15 @@ pub(super) enum Section {
     Points,
     /// `connectivity`, `offsets`, `types`, and what further arrays describe cells.
     Cells,
+    /// Those along each axis of a rectilinear grid.
+    Coordinates,
 }
 
 impl Section {
     fn from_name(name: &str) -> Option<Section> {
-        [Section::PointData, Section::CellData, Section::Points, Section::Cells].into_iter().find(|s| s.name() == name)
+        const ALL: [Section; 5] =
+            [Section::PointData, Section::CellData, Section::Points, Section::Cells, Section::Coordinates];
+        ALL.into_iter().find(|s| s.name() == name)
     }
 
     pub(super) fn name(self) -> &'static str {
@@ -33,6 +40,7 @@ impl Section {
             Section::CellData => "CellData",
             Section::Points => "Points",
             Section::Cells => "Cells",
+            Section::Coordinates => "Coordinates",
         }
     }
 
@@ -53,10 +61,12 @@ pub(super) struct Piece {
     pub(super) store: usize,
     pub(super) points: u64,
     pub(super) cells: u64,
+    /// Where it is in a grid that is not unstructured.
+    pub(super) block: Option<Block>,
     /// Lagrange hexahedra are numbered as before VTK 9.
     pub(super) old_numbering: bool,
     /// The arrays of each section.
-    arrays: [Vec<DataArray>; 4],
+    pub(super) arrays: [Vec<DataArray>; 5],
 }
 
 impl Piece {
@@ -142,7 +152,12 @@ pub(super) struct Head {
     /// What it says of the arrays of points, and of cells.
     pub(super) attributes: [Attributes; 2],
     /// Lagrange hexahedra are numbered as before VTK 9.
-    old_numbering: bool,
+    pub(super) old_numbering: bool,
+    pub(super) kind: Kind,
+    /// Where image data is.
+    pub(super) lattice: Lattice,
+    /// The whole of a grid that is not unstructured, which a piece is that says no extent.
+    pub(super) whole: Option<Block>,
 }
 
 impl Head {
@@ -170,6 +185,9 @@ impl Head {
             times: Vec::new(),
             attributes: Default::default(),
             old_numbering: false,
+            kind: Kind::default(),
+            lattice: Lattice::default(),
+            whole: None,
         };
         let inner = BufReader::with_capacity((length as usize).clamp(1 << 10, 1 << 18), file);
         let mut reader = Reader::from_reader(Limited { inner, left: MOST_OF_A_TAG });
@@ -218,7 +236,7 @@ impl Head {
         Ok(head)
     }
 
-    fn malformed(&self, what: impl Into<String>) -> Error {
+    pub(super) fn malformed(&self, what: impl Into<String>) -> Error {
         Error::malformed(&self.store.input.path, what)
     }
 
@@ -232,7 +250,8 @@ impl Head {
                 let other = other.escape_debug();
                 return Err(self.malformed(format!("this is no VTK file: its first element is <{other}>")));
             }
-            (Some(Element::File), "UnstructuredGrid") if !self.is_list && self.collection.is_none() => {
+            (Some(Element::File), name) if name == self.kind.name() && !self.is_list && self.collection.is_none() => {
+                self.add_whole(tag)?;
                 let times = self.attribute(tag, "TimeValues")?.unwrap_or_default();
                 self.times = times.split_ascii_whitespace().map(|t| self.time(t)).collect::<Result<_>>()?;
                 Element::Grid
@@ -250,7 +269,9 @@ impl Head {
                 self.add_roles(usize::from(name.as_ref() == "PCellData"), tag)?;
                 Element::Other
             }
-            (Some(Element::File), "PUnstructuredGrid") if self.is_list => Element::List,
+            (Some(Element::File), name) if self.is_list && name.strip_prefix('P') == Some(self.kind.name()) => {
+                Element::List
+            }
             (Some(Element::List), "Piece") => {
                 let source = self.attribute(tag, "Source")?;
                 let source = source.ok_or_else(|| self.malformed("a <Piece> has no Source"))?;
@@ -258,12 +279,7 @@ impl Head {
                 Element::Other
             }
             (Some(Element::Grid), "Piece") => {
-                let piece = Piece {
-                    points: self.count(tag, "NumberOfPoints")?,
-                    cells: self.count(tag, "NumberOfCells")?,
-                    old_numbering: self.old_numbering,
-                    ..Piece::default()
-                };
+                let piece = self.piece(tag)?;
                 self.pieces.push(piece);
                 Element::Piece
             }
@@ -281,10 +297,11 @@ impl Head {
 
     fn root(&mut self, tag: &BytesStart<'_>) -> Result<Element> {
         let kind = self.attribute(tag, "type")?.unwrap_or_default();
-        self.is_list = kind == "PUnstructuredGrid";
         self.collection = (kind == "Collection").then(Vec::new);
-        if kind != "UnstructuredGrid" && !self.is_list && self.collection.is_none() {
-            return Err(refuse(&self.store.input.path, &kind));
+        match Kind::from_type(&kind) {
+            Some(found) => (self.kind, self.is_list) = found,
+            None if self.collection.is_some() => {}
+            None => return Err(refuse(&self.store.input.path, &kind)),
         }
         let version = self.attribute(tag, "version")?.unwrap_or_default();
         let (major, minor) = version.split_once('.').unwrap_or((&version, "0"));
@@ -333,7 +350,7 @@ impl Head {
             return Ok(None);
         }
         let bits = kind == "Bit";
-        let kind = Kind::from_name(if bits { "UInt8" } else { &kind })
+        let kind = NumberKind::from_name(if bits { "UInt8" } else { &kind })
             .ok_or_else(|| fail(format!("its type is \"{}\"", kind.escape_debug())))?;
         let components = match self.attribute(tag, "NumberOfComponents")?.filter(|text| !text.is_empty()) {
             Some(text) => {
@@ -391,12 +408,12 @@ impl Head {
         }
     }
 
-    fn count(&self, tag: &BytesStart<'_>, name: &str) -> Result<u64> {
+    pub(super) fn count(&self, tag: &BytesStart<'_>, name: &str) -> Result<u64> {
         let value = self.attribute(tag, name)?.ok_or_else(|| self.malformed(format!("a <Piece> has no {name}")))?;
         value.trim().parse().map_err(|_| self.malformed(format!("{name} is \"{}\", not a count", value.escape_debug())))
     }
 
-    fn attribute(&self, tag: &BytesStart<'_>, name: &str) -> Result<Option<String>> {
+    pub(super) fn attribute(&self, tag: &BytesStart<'_>, name: &str) -> Result<Option<String>> {
         let found = tag.try_get_attribute(name).map_err(|e| self.malformed(format!("XML: {e}")))?;
         // VTK writes names with a bare `&`: what cannot be unescaped is taken as it is.
         Ok(found.map(|found| match quick_xml::escape::unescape(&found.value) {
