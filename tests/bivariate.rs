@@ -69,7 +69,7 @@ fn lit(transfer: TransferFunction, shade: Shade, origins: &[Origin]) -> Transfer
 fn table() -> Table {
     let texel = |i: usize| {
         let (s, g) = ((i % 7) as f64 / 6.0, (i / 7) as f64 / 4.0);
-        [s, g, 1.0 - s, if i % 3 == 0 { 0.0 } else { s * 0.6 }]
+        [s, g, 1.0 - s, if i.is_multiple_of(3) { 0.0 } else { s * 0.6 }]
     };
     Table::new([7, 5], (0..35).map(texel).collect(), [[-0.7, 0.9], [0.0, 4.0]]).unwrap()
 }

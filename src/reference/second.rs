@@ -226,8 +226,9 @@ impl Reference<'_> {
             }
             Some(Source::Table(table)) => {
                 let places = [0, 1].map(|end| table.place([s[end], g[end]]));
-                for k in 0..2 {
-                    (0..table.size()[k]).for_each(|i| cut([places[0][k], places[1][k]], i as f64));
+                let [first, last] = places;
+                for ((from, to), n) in first.into_iter().zip(last).zip(table.size()) {
+                    (0..n).for_each(|i| cut([from, to], i as f64));
                 }
             }
             Some(Source::Scalar) | None => {

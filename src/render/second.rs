@@ -3,6 +3,7 @@
 
 use super::{Drawn, Loaded, Progress, Renderer, Stats, missing, ms};
 use crate::error::{Error, Result};
+use crate::field::gradient::length;
 use crate::field::normal::MOST;
 use crate::field::{Association, Field, Gradient, Kind, Normal};
 use crate::geometry::Values;
@@ -207,7 +208,7 @@ impl Extra {
         let pair = |p: u32| {
             let g = match (field.second(), &of_g) {
                 (Some(of), Some(added)) => at(of, added, p),
-                _ => vector(p).length() * scale,
+                _ => length(vector(p)) * scale,
             };
             [normal[0].bounded(at(field, &of_s, p), MOST), normal[1].bounded(g, MOST)]
         };

@@ -136,7 +136,7 @@ fn mistakes_are_named() {
         (format!(r#"{LOOK}, {shade}, "blend": "maximum""#), vec!["shade: a maximum"]),
         (format!(r#"{LOOK}, "silhouette": 1, "blend": "maximum""#), vec!["silhouette: a maximum"]),
         (
-            format!(r#""widgets": [{{"type": "uniform", "color": [0, 0, 1], "opacity": 1}}], "blend": "maximum""#),
+            r#""widgets": [{"type": "uniform", "color": [0, 0, 1], "opacity": 1}], "blend": "maximum""#.into(),
             vec!["widgets: a maximum"],
         ),
         (

@@ -214,15 +214,19 @@ impl Second {
                 h *= 0.5;
                 continue;
             }
-            let mut emitted = [0.0; 3];
+            let (mut emitted, mut absorbed) = ([0.0; 3], 0.0);
             for i in 0..NODES {
                 let before: f64 = (0..NODES).map(|j| self.rule.to_node[i][j] * nodes[j].density[3]).sum::<f64>() * h;
                 let seen = (-before).exp() * self.rule.weights[i] * h;
                 for (sum, q) in emitted.iter_mut().zip(nodes[i].density) {
                     *sum += seen * q;
                 }
+                absorbed += seen * nodes[i].density[3];
             }
-            light.add(emitted.map(|c| c as f32), -(-depth).exp_m1() as f32);
+            let opacity = -(-depth).exp_m1();
+            // What one colour emits is that times the opacity, whatever the nodes miss of it.
+            let right = if self.direct.is_none() && absorbed > 0.0 { opacity / absorbed } else { 1.0 };
+            light.add(emitted.map(|c| (c * right) as f32), opacity as f32);
             count += 1;
             u += h;
             h = (2.0 * h).min(longest);
