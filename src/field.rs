@@ -4,7 +4,7 @@ pub mod gradient;
 pub(crate) mod normal;
 
 use crate::error::{Error, Result};
-use crate::mesh::{Array, Mesh, with_values};
+use crate::mesh::{Array, Arrays, Values, with_values};
 pub use gradient::Gradient;
 pub use normal::Normal;
 use rayon::prelude::*;
@@ -56,30 +56,23 @@ impl Kind {
     }
 }
 
-/// The field that is drawn: its values in the array's own units, each as exact as f64 holds it.
+/// The field that is drawn: its values in the array's own units and type; magnitudes are f64.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Field {
     association: Association,
     kind: Kind,
-    values: Arc<Stored>,
+    values: Arc<Values>,
     normal: [Normal; 4],
     range: [[f64; 2]; 4],
     second: Option<Arc<Field>>,
 }
 
-/// Values one after another, in the shortest type that holds each exactly.
-#[derive(Debug, PartialEq)]
-enum Stored {
-    Short(Vec<f32>),
-    Long(Vec<f64>),
-}
-
 impl Field {
-    /// Takes `component` of the array called `name` of `mesh`. With no association given, points are searched first.
+    /// Takes `component` of the array called `name` of `mesh` (or of a grid). With no association given, points are searched first.
     ///
     /// # Errors
     /// [`Error::Field`] if no such array or component exists, or it holds no finite value.
-    pub fn new(mesh: &Mesh, name: &str, association: Option<Association>, component: Component) -> Result<Self> {
+    pub fn new(mesh: &impl Arrays, name: &str, association: Option<Association>, component: Component) -> Result<Self> {
         let sources = [(Association::Point, mesh.point_arrays()), (Association::Cell, mesh.cell_arrays())];
         let wanted = |a: &Association| association.is_none_or(|w| w == *a);
         let found = sources
@@ -171,12 +164,10 @@ impl Field {
             // The colour needs no function, only its own scale: bytes are 255ths, anything else is taken as it is.
             normal[..3].fill(Normal { mid: 0.0, half: T::FULL });
         }
-        let at = |i: usize| value(i / m, i % m);
         let values = match component {
-            Component::Index(_) | Component::All if T::SHORT => {
-                Stored::Short((0..tuples * m).into_par_iter().map(|i| at(i) as f32).collect())
-            }
-            _ => Stored::Long((0..tuples * m).into_par_iter().map(at).collect()),
+            Component::Index(i) => T::values((0..tuples).into_par_iter().map(|t| numbers[t * n + i]).collect()),
+            Component::All => T::values(numbers.to_vec()),
+            Component::Magnitude => Values::F64((0..tuples).into_par_iter().map(|t| value(t, 0)).collect()),
         };
         Ok(Field { association, kind, values: Arc::new(values), normal, range, second: None })
     }
@@ -220,15 +211,12 @@ impl Field {
 
     /// How many values there are: [`Kind::components`] for each point or cell.
     pub fn len(&self) -> usize {
-        match &*self.values {
-            Stored::Short(v) => v.len(),
-            Stored::Long(v) => v.len(),
-        }
+        self.values.len()
     }
 
     /// Whether f32 holds each value exactly.
     pub(crate) fn is_short(&self) -> bool {
-        matches!(*self.values, Stored::Short(_))
+        matches!(*self.values, Values::F32(_) | Values::I8(_) | Values::U8(_) | Values::I16(_) | Values::U16(_))
     }
 
     /// Whether there is no value.
@@ -242,18 +230,20 @@ impl Field {
     /// # Panics
     /// If there are not as many.
     pub fn value(&self, i: usize) -> f64 {
-        match &*self.values {
-            Stored::Short(v) => f64::from(v[i]),
-            Stored::Long(v) => v[i],
-        }
+        self.values.get(i)
     }
 
     /// All values, in the array's own units.
     pub fn values(&self) -> Cow<'_, [f64]> {
         match &*self.values {
-            Stored::Short(v) => v.par_iter().map(|&v| f64::from(v)).collect::<Vec<_>>().into(),
-            Stored::Long(v) => v.into(),
+            Values::F64(v) => v.into(),
+            other => (0..other.len()).into_par_iter().map(|i| other.get(i)).collect::<Vec<_>>().into(),
         }
+    }
+
+    /// All values, for whoever keeps them as they are.
+    pub(crate) fn shared(&self) -> &Arc<Values> {
+        &self.values
     }
 
     /// The map of all finite values of component `k` to [−1, 1]; for colours of [`Kind::Rgba`], of what is a full one to
@@ -283,27 +273,29 @@ impl Field {
 pub trait Number: Copy + Send + Sync {
     /// What a colour component at its full is in this type.
     const FULL: f64;
-    /// Whether f32 holds each such number exactly.
-    const SHORT: bool;
     /// The number as f64, rounded if it must be.
     fn to_f64(self) -> f64;
+    /// An array of them.
+    fn values(numbers: Vec<Self>) -> Values;
 }
 
 macro_rules! numbers {
-    ($($t:ty, $full:expr, $short:expr;)*) => {
+    ($($t:ty, $full:expr, $variant:ident;)*) => {
         $(impl Number for $t {
             const FULL: f64 = $full;
-            const SHORT: bool = $short;
             #[allow(clippy::cast_lossless, clippy::unnecessary_cast, reason = "one cast for ten types")]
             fn to_f64(self) -> f64 {
                 self as f64
+            }
+            fn values(numbers: Vec<Self>) -> Values {
+                Values::$variant(numbers)
             }
         })*
     };
 }
 numbers! {
-    i8, 1.0, true; u8, 255.0, true; i16, 1.0, true; u16, 1.0, true; i32, 1.0, false; u32, 1.0, false;
-    i64, 1.0, false; u64, 1.0, false; f32, 1.0, true; f64, 1.0, false;
+    i8, 1.0, I8; u8, 255.0, U8; i16, 1.0, I16; u16, 1.0, U16; i32, 1.0, I32; u32, 1.0, U32; i64, 1.0, I64;
+    u64, 1.0, U64; f32, 1.0, F32; f64, 1.0, F64;
 }
 
 /// The length of a tuple, without overflow for components up to 1e300.

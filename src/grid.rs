@@ -4,7 +4,8 @@
 
 use crate::error::{Error, Result};
 use crate::memory;
-use crate::mesh::{Array, Attributes, Cells, Mesh, check_array};
+use crate::mesh::cells::ghosts;
+use crate::mesh::{Array, Attributes, Cells, Mesh, Values, check_array, has_arrays};
 use glam::{DMat3, DVec3};
 
 /// VTK's cell types of grids by the number of axes along which there is more than one point: in a regular or
@@ -46,6 +47,8 @@ pub struct Lattice {
     /// Points along each axis, at least 1.
     pub size: [usize; 3],
 }
+
+has_arrays!(Grid);
 
 impl Default for Lattice {
     fn default() -> Self {
@@ -194,6 +197,73 @@ impl Grid {
         &self.cell_attributes
     }
 
+    /// The grid stretched about the world's origin, by a factor for each of the world's axes.
+    ///
+    /// # Errors
+    /// [`Error::Mesh`] if a factor is 0 or not finite.
+    pub fn scaled(mut self, by: DVec3) -> Result<Self> {
+        if !by.is_finite() || by.cmpeq(DVec3::ZERO).any() {
+            return Err(Error::Mesh(format!("it cannot be stretched by {by}")));
+        }
+        self.origin *= by;
+        if self.direction == DMat3::IDENTITY {
+            for (axis, by) in self.axes.iter_mut().zip(by.to_array()) {
+                axis.iter_mut().for_each(|c| *c *= by);
+            }
+        } else {
+            self.direction = DMat3::from_diagonal(by) * self.direction;
+        }
+        Ok(self)
+    }
+
+    /// A bit for each cell that is not to be drawn: it is marked as duplicate, refined or hidden, or one of its points as
+    /// hidden. None if there is none.
+    pub(crate) fn hidden(&self) -> Option<Vec<u64>> {
+        let ([nx, ny, _], points, [x, y, z]) = (self.size(), ghosts::of_points(&self.point_arrays), self.cells());
+        let cells = ghosts::of_cells(&self.cell_arrays);
+        if points.is_none() && cells.is_none() {
+            return None;
+        }
+        let mut bits = vec![0_u64; (x * y * z).div_ceil(64)];
+        let corners = [0, 1, nx, nx + 1].map(|p| [p, p + nx * ny]);
+        for c in 0..x * y * z {
+            let first = (c / (x * y) * ny + c / x % y) * nx + c % x;
+            let hidden = cells.as_ref().is_some_and(|of| of(c))
+                || points.as_ref().is_some_and(|of| corners.as_flattened().iter().any(|p| of(first + p)));
+            bits[c / 64] |= u64::from(hidden) << (c % 64);
+        }
+        bits.iter().any(|word| *word != 0).then_some(bits)
+    }
+
+    /// The grid itself if it has at most `most` points; else one of every so many points along each axis, and of the
+    /// last ones, with the values of those and of the cells behind them: enough to choose colours and a view by.
+    ///
+    /// # Errors
+    /// None in practice: those of [`Self::rectilinear`].
+    pub fn coarse(&self, most: usize) -> Result<Self> {
+        let size = self.size();
+        let kept = |step: usize, n: usize| (n - 1).div_ceil(step) + 1;
+        let step = (1..).find(|step| size.iter().map(|n| kept(*step, *n)).product::<usize>() <= most.max(8));
+        let step = step.unwrap_or(1);
+        if step == 1 {
+            return Ok(self.clone());
+        }
+        let index = size.map(|n| (0..kept(step, n)).map(|i| (i * step).min(n - 1)).collect::<Vec<_>>());
+        let axes = [0, 1, 2].map(|a| index[a].iter().map(|i| self.axes[a][*i]).collect());
+        // The cell behind each but the last point of an axis.
+        let cells = [0, 1, 2].map(|a| index[a][..index[a].len().saturating_sub(1).max(1)].to_vec());
+        let gather = |arrays: &[Array], [x, y, z]: &[Vec<usize>; 3], [nx, ny, _]: [usize; 3]| {
+            let at = z.iter().flat_map(|k| y.iter().flat_map(move |j| x.iter().map(move |i| (k * ny + j) * nx + i)));
+            let at: Vec<usize> = at.collect();
+            let own = |a: &Array| Array { values: a.values.gathered(a.components, &at), ..named(a) };
+            arrays.iter().map(own).collect::<Vec<_>>()
+        };
+        let arrays = [gather(&self.point_arrays, &index, size), gather(&self.cell_arrays, &cells, self.cells())];
+        let mut coarse = Self::new(axes, self.origin, self.direction, false, arrays)?;
+        coarse.set_attributes(self.point_attributes.clone(), self.cell_attributes.clone());
+        Ok(coarse)
+    }
+
     /// The grid as a mesh of voxels (or pixels, lines, a vertex), on the same points and with the same arrays.
     ///
     /// # Errors
@@ -207,6 +277,11 @@ impl Grid {
         mesh.set_attributes(self.point_attributes, self.cell_attributes);
         Ok(mesh)
     }
+}
+
+/// An array without values, called as another.
+fn named(array: &Array) -> Array {
+    Array { name: array.name.clone(), components: array.components, values: Values::U8(vec![]) }
 }
 
 fn size_of_points(axes: &[Vec<f64>; 3]) -> [usize; 3] {

@@ -9,13 +9,15 @@
 //!    out for engines.
 //! 3. [`field::Field`] is the array that is drawn, [`transfer::TransferFunction`] says how.
 //! 4. [`integral`] is the light that one straight segment of a ray inside a cell sends and lets through.
-//! 5. [`traverse`] walks each pixel's ray of a [`view::View`] from cell to cell and adds those up.
+//! 5. [`traverse`] walks each pixel's ray of a [`view::View`] from cell to cell and adds those up; regular and rectilinear
+//!    grids have a caster of their own.
 //! 6. [`image::Image`] holds the result: linear premultiplied RGBA, 32-bit float.
 //!
 //! [`render::Renderer`] is the whole flow behind one door, [`host::Session`] that door inside another program; with the
 //! feature `ffi` it opens to C++. [`scene`] describes a picture in a JSON file, and
 //! [`mod@reference`] is the slow float64 second opinion that the tests judge the engines by.
 
+pub mod cast;
 pub mod cell;
 pub mod error;
 #[cfg(feature = "ffi")]

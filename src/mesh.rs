@@ -107,6 +107,46 @@ impl Array {
     }
 }
 
+/// What has arrays of points and of cells: a [`Mesh`], or a [`crate::grid::Grid`].
+pub trait Arrays {
+    /// Number of cells of all types.
+    fn cell_count(&self) -> usize;
+    /// The arrays with a value for each point.
+    fn point_arrays(&self) -> &[Array];
+    /// The arrays with a value for each cell.
+    fn cell_arrays(&self) -> &[Array];
+    /// What is known of the arrays of points beside their values.
+    fn point_attributes(&self) -> &Attributes;
+    /// What is known of the arrays of cells beside their values.
+    fn cell_attributes(&self) -> &Attributes;
+}
+
+/// Implements [`Arrays`] by methods of the same names.
+macro_rules! has_arrays {
+    ($type:ty) => {
+        impl $crate::mesh::Arrays for $type {
+            fn cell_count(&self) -> usize {
+                self.cell_count()
+            }
+            fn point_arrays(&self) -> &[$crate::mesh::Array] {
+                self.point_arrays()
+            }
+            fn cell_arrays(&self) -> &[$crate::mesh::Array] {
+                self.cell_arrays()
+            }
+            fn point_attributes(&self) -> &$crate::mesh::Attributes {
+                self.point_attributes()
+            }
+            fn cell_attributes(&self) -> &$crate::mesh::Attributes {
+                self.cell_attributes()
+            }
+        }
+    };
+}
+pub(crate) use has_arrays;
+
+has_arrays!(Mesh);
+
 /// The cells of a mesh, as VTK lays them out.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Cells {
@@ -314,6 +354,11 @@ impl Mesh {
     /// The cells, of every type that the file has.
     pub fn cells(&self) -> &Cells {
         &self.cells
+    }
+
+    /// Number of cells of all types.
+    pub fn cell_count(&self) -> usize {
+        self.cells.len()
     }
 
     /// The faces of its polyhedra.

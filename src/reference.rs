@@ -1,10 +1,12 @@
 //! The judge: a slow renderer in f64 that shares no code with the engines, so that no bug can hide in both.
 //!
-//! It tests every tetrahedron against every ray, sorts the intervals by entry, and integrates each piece between two
+//! It tests every tetrahedron (or, of a grid, every voxel: `grid`) against every ray, sorts the intervals by entry, and integrates each piece between two
 //! knots numerically: ∫ c τ exp(−∫τ) by Gauss–Legendre with halving, to about 1e-10.
 
+mod grid;
 mod second;
 
+pub use grid::render_grid;
 pub use second::segment_of_two;
 
 use crate::error::{Error, Result};
@@ -37,6 +39,8 @@ pub struct Reference<'a> {
     transfer: &'a TransferFunction,
     kind: Kind,
     cells: Vec<Tetrahedron>,
+    /// The voxels of a grid, in place of cells.
+    boxes: Option<grid::Boxes>,
     /// Middle of the bounds, which coordinates are relative to, and half their diagonal.
     centre: DVec3,
     extent: f64,
@@ -50,8 +54,15 @@ const COMPONENTS: usize = 5;
 /// What a segment of `length` world units emits and absorbs, premultiplied RGBA, whose field of one component, in the
 /// array's own units, is linear from `front`, where the ray enters, to `back`.
 pub fn segment(transfer: &TransferFunction, front: f64, back: f64, length: f64) -> [f64; 4] {
-    let alone =
-        Reference { transfer, kind: Kind::Scalar, cells: vec![], centre: DVec3::ZERO, extent: 0.0, steepest: 0.0 };
+    let alone = Reference {
+        transfer,
+        kind: Kind::Scalar,
+        cells: vec![],
+        boxes: None,
+        centre: DVec3::ZERO,
+        extent: 0.0,
+        steepest: 0.0,
+    };
     let interval = Interval { t: [0.0, length], values: [front, back].map(|s| [s, 0.0, 0.0, 0.0, 0.0]) };
     alone.composite(std::iter::once(interval))
 }
@@ -148,7 +159,7 @@ impl<'a> Reference<'a> {
                 cells.push(tet);
             }
         }
-        Ok(Reference { transfer, kind: field.kind(), cells, centre: middle, extent, steepest })
+        Ok(Reference { transfer, kind: field.kind(), cells, boxes: None, centre: middle, extent, steepest })
     }
 
     /// Premultiplied RGBA of every pixel, row by row from the top. Runs on the current rayon pool.
@@ -167,7 +178,10 @@ impl<'a> Reference<'a> {
         let aside = DVec3::new(0.86, -0.19, 0.47) * (self.extent * 1e-11);
         let tries = (0..8).map(|n| self.intervals(origin + aside * f64::from((1 << n) - 1), ray.direction));
         // A ray that lies in a face or an edge belongs to no cell, or to several: it is moved off.
-        let mut intervals = tries.flatten().next().unwrap_or_default();
+        let mut intervals = match &self.boxes {
+            Some(boxes) => boxes.intervals(origin, ray.direction),
+            None => tries.flatten().next().unwrap_or_default(),
+        };
         intervals.sort_by(|a, b| a.t[0].total_cmp(&b.t[0]).then(a.t[1].total_cmp(&b.t[1])));
         let [start, end] = [ray.t_min - shift, ray.t_max - shift];
         let visible = intervals.iter().filter_map(|i| i.clip(start, end));

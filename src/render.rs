@@ -1,11 +1,13 @@
 //! The whole flow behind one door: mesh, field, transfer function and view in, image out.
 
 mod backend;
+mod grid;
 mod prepared;
 mod second;
 mod stats;
 mod tables;
 
+use crate::cast::Reconstruction;
 use crate::error::{Error, Result};
 use crate::field::Field;
 use crate::geometry::Geometry;
@@ -23,6 +25,7 @@ use crate::transfer::TransferFunction;
 use crate::view::{Blend, View};
 use backend::{Backend, Drawn};
 use glam::DVec3;
+use grid::LoadedGrid;
 use prepared::{AnyValues, Prepared};
 use second::Extra;
 pub use stats::{ProjectionStats, Stats, SweepStats};
@@ -54,6 +57,9 @@ pub struct Renderer {
     backend: Backend,
     switches: Switches,
     mesh: Option<Loaded>,
+    /// The grid that is drawn, in place of a mesh.
+    grid: Option<LoadedGrid>,
+    reconstruction: Reconstruction,
     field: Option<Prepared>,
     transfer: Option<TransferFunction>,
     exact: Option<Exact<f32>>,
@@ -175,6 +181,8 @@ impl Renderer {
             backend,
             switches: Switches::default(),
             mesh: None,
+            grid: None,
+            reconstruction: Reconstruction::default(),
             field: None,
             transfer: None,
             exact: None,
@@ -199,6 +207,9 @@ impl Renderer {
     fn name_device(&mut self) {
         // Whether tables are built on the device depends on it.
         self.key = None;
+        if self.grid.is_some() {
+            return self.name_caster();
+        }
         let flat = self.mesh.as_ref().is_some_and(|m| m.flat);
         let second = self.transfer.as_ref().is_some_and(|t| !t.is_of_one_variable());
         let walks = flat || second;
@@ -274,6 +285,7 @@ impl Renderer {
         tetrahedra: Tetrahedra,
         report: &(dyn Fn(f64) + Sync),
     ) {
+        self.grid = None;
         let start = Instant::now();
         let (connected, on_device) = (self.backend.needs_neighbours(), self.backend.gpu().is_some());
         let mesh = self.pool.install(|| Loaded::new(points, cells, tetrahedra, connected, on_device, report));
@@ -336,11 +348,14 @@ impl Renderer {
         Ok(())
     }
 
-    /// Draws another field of the mesh from now on.
+    /// Draws another field of the mesh, or grid, from now on.
     ///
     /// # Errors
-    /// [`Error::Render`] if there is no mesh; [`Error::Field`] if the field does not fit it.
+    /// [`Error::Render`] if there is neither; [`Error::Field`] if the field does not fit it.
     pub fn set_field(&mut self, field: &Field) -> Result<()> {
+        if self.grid.is_some() {
+            return self.set_grid_field(field);
+        }
         let start = Instant::now();
         let mesh = self.mesh.as_ref().ok_or_else(|| Error::Render("a field needs a mesh first".into()))?;
         let tables = self.integral.form != Form::Exact;
@@ -357,6 +372,9 @@ impl Renderer {
     /// Draws with another transfer function from now on.
     pub fn set_transfer(&mut self, transfer: &TransferFunction) {
         self.transfer = Some(transfer.clone());
+        if let Some(grid) = &mut self.grid {
+            grid.forget_function();
+        }
         self.forget(Part::Function);
         self.name_device();
     }
@@ -445,6 +463,9 @@ impl Renderer {
     }
 
     fn try_render(&mut self, view: &View, progress: &Progress) -> Result<Image> {
+        if self.grid.is_some() {
+            return self.cast(view, progress);
+        }
         if self.transfer.as_ref().is_some_and(|t| !t.is_of_one_variable()) {
             return self.render_second(view, progress);
         }

@@ -22,7 +22,7 @@ pub use reader::read;
 use crate::error::{Error, Result};
 use crate::field::{Association, Component, Field};
 use crate::memory;
-use crate::mesh::Mesh;
+use crate::mesh::Arrays;
 use crate::transfer::TransferFunction;
 use crate::view::{Blend, Camera, ClippingPlane, DepthBuffer, DepthKind, View};
 use glam::DVec2;
@@ -80,11 +80,11 @@ pub struct Scalars {
 }
 
 impl Scalars {
-    /// The field that these are in `mesh`.
+    /// The field that these are in `mesh`, or in a grid.
     ///
     /// # Errors
     /// [`Error::Field`] if there is no such array or component, or nothing finite in it.
-    pub fn field(&self, mesh: &Mesh) -> Result<Field> {
+    pub fn field(&self, mesh: &impl Arrays) -> Result<Field> {
         let wanted = |a| self.association.is_none_or(|w| w == a);
         let points = mesh.point_arrays().iter().filter(|_| wanted(Association::Point));
         let cells = mesh.cell_arrays().iter().filter(|_| wanted(Association::Cell));
@@ -100,7 +100,7 @@ impl Scalars {
     ///
     /// # Errors
     /// Likewise, and those of [`Field::with_second`].
-    pub fn field_with(&self, mesh: &Mesh, second: Option<&str>) -> Result<Field> {
+    pub fn field_with(&self, mesh: &impl Arrays, second: Option<&str>) -> Result<Field> {
         let field = self.field(mesh)?;
         let Some(name) = second else { return Ok(field) };
         let association = Some(field.association());
@@ -126,7 +126,7 @@ impl Scene {
     ///
     /// # Errors
     /// Those of [`Scalars::field`] and [`Field::with_second`].
-    pub fn field(&self, mesh: &Mesh) -> Result<Field> {
+    pub fn field(&self, mesh: &impl Arrays) -> Result<Field> {
         self.scalars.field_with(mesh, self.gradient_array.as_deref())
     }
 

@@ -172,7 +172,7 @@ impl<R: Real> Knots<R> {
 
     /// The interval that `s` lies in: the last whose lower end is not above it.
     #[inline(always)]
-    fn interval(&self, s: R) -> usize {
+    pub(crate) fn interval(&self, s: R) -> usize {
         let scaled = (s + R::of(1.0)) * R::of(BUCKETS as f64 / 2.0);
         let b = scaled.max(R::of(0.0)).min(R::of((BUCKETS - 1) as f64));
         let b = b.truncate() as usize;

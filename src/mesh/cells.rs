@@ -10,6 +10,7 @@
 //! around points inside (`polyhedron`). Both may add points to those of the mesh.
 
 mod curved;
+pub(crate) mod ghosts;
 mod linear;
 mod polyhedron;
 mod splitter;

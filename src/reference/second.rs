@@ -27,7 +27,7 @@ type Density = [f64; 4];
 /// their own units, are linear from `front`, where the ray enters, to `back`. There is no gradient.
 pub fn segment_of_two(transfer: &TransferFunction, front: [f64; 2], back: [f64; 2], length: f64) -> [f64; 4] {
     let (centre, kind) = (DVec3::ZERO, Kind::Scalar);
-    let alone = Reference { transfer, kind, cells: vec![], centre, extent: 0.0, steepest: 0.0 };
+    let alone = Reference { transfer, kind, cells: vec![], boxes: None, centre, extent: 0.0, steepest: 0.0 };
     let interval = Interval { t: [0.0, length], values: [front, back].map(|[s, g]| [s, g, 0.0, 0.0, 0.0]) };
     alone.composite_two(std::iter::once(interval), DVec3::ZERO, DVec3::Z)
 }

@@ -3,7 +3,7 @@
 /// What a renderer did and how long it took.
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub struct Stats {
-    /// Name of the engine: "traverse" or "project".
+    /// Name of the engine: "traverse", "project", or "grid" for regular and rectilinear grids.
     pub engine: String,
     /// "cpu" or "gpu".
     pub device: String,
@@ -28,7 +28,7 @@ pub struct Stats {
     pub table_bytes: u64,
     /// Knots of the function that the values of the mean cell have between them; 0 unless the form is chosen by that.
     pub knots_per_cell: f64,
-    /// Tetrahedra visited in the last frame, over all rays.
+    /// Tetrahedra, or voxels of a grid, visited in the last frame, over all rays.
     pub steps: u64,
     /// Rays of the last frame that had to be traced again beside an edge.
     pub repaired_rays: u64,

@@ -12,7 +12,7 @@ pub use range::range;
 use super::{Scalars, Scene};
 use crate::error::Result;
 use crate::field::{Association, Component, Field};
-use crate::mesh::{Mesh, cells::Tetrahedra};
+use crate::mesh::{Arrays, Mesh, cells::Tetrahedra};
 use crate::transfer::Axis;
 use crate::transfer::colormap::ColorMap;
 use crate::view::{Blend, Camera};
@@ -98,14 +98,14 @@ pub fn scalars(mesh: &Mesh, of: Option<Association>) -> Result<Scalars> {
     Ok(scalars)
 }
 
-/// What a mesh without arrays is drawn as: one value everywhere, for a colour map of one colour.
+/// What a mesh, or a grid, without arrays is drawn as: one value everywhere, for a colour map of one colour.
 ///
 /// # Errors
 /// [`Error::Field`] if there is no cell.
 ///
 /// [`Error::Field`]: crate::Error::Field
-pub fn solid(mesh: &Mesh) -> Result<(Field, ColorMap)> {
-    let field = Field::from_slice("", &vec![0_u8; mesh.cells().len()], 1, Association::Cell, Component::Index(0))?;
+pub fn solid(mesh: &impl Arrays) -> Result<(Field, ColorMap)> {
+    let field = Field::from_slice("", &vec![0_u8; mesh.cell_count()], 1, Association::Cell, Component::Index(0))?;
     Ok((field, ColorMap::solid(SOLID)))
 }
 

@@ -64,7 +64,8 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     let first = measure(options, &job, &mut renderer)?;
     let mut runs = vec![first];
     drop(renderer);
-    if choice == DeviceChoice::Auto {
+    // Grids are drawn by the CPU on every device.
+    if choice == DeviceChoice::Auto && job.grid.is_none() {
         for other in others(&runs[0].stats) {
             let mut renderer = options.request.renderer(threads, scene.as_ref(), other)?;
             match measure(options, &job, &mut renderer) {
@@ -116,8 +117,12 @@ fn measure(options: &Options, job: &Job, renderer: &mut Renderer) -> Result<Run>
         Ok(scene.view()?.0)
     });
     let views: Vec<View> = views.collect::<Result<_>>()?;
-    renderer.check_room(job.mesh.points().len(), &job.tetrahedra)?;
-    progress::during("matching faces", |p| renderer.set_mesh_with_progress(&job.mesh, job.tetrahedra.clone(), p));
+    if let Some(grid) = &job.grid {
+        renderer.set_grid(grid)?;
+    } else {
+        renderer.check_room(job.mesh.points().len(), &job.tetrahedra)?;
+        progress::during("matching faces", |p| renderer.set_mesh_with_progress(&job.mesh, job.tetrahedra.clone(), p));
+    }
     renderer.set_field(&job.field)?;
     renderer.set_transfer(&job.scene.transfer);
     let name = renderer.stats().adapter.clone();

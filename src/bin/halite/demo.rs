@@ -33,5 +33,5 @@ fn prepare() -> Result<Job> {
     let scalars = Scalars { name: "s".into(), association: None, component: None };
     let field = scalars.field(&mesh)?;
     let scene = automatic::scene(&mesh, &tetrahedra, scalars, &field, Default::default())?;
-    Ok(Job { mesh, tetrahedra, field, scene, legend: None, load_ms: 0.0, split_ms: 0.0 })
+    Ok(Job { mesh, grid: None, tetrahedra, field, scene, legend: None, load_ms: 0.0, split_ms: 0.0 })
 }

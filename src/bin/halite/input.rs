@@ -2,7 +2,8 @@
 
 use crate::progress;
 use anyhow::{Context, Result, bail};
-use halite::io::{Source, Time};
+use halite::grid::Grid;
+use halite::io::{DataSet, Source, Time};
 use halite::mesh::Mesh;
 use halite::scene::Scene;
 use std::io::{IsTerminal, Read};
@@ -37,8 +38,29 @@ pub(crate) fn source(path: &Path) -> Result<Source> {
     Ok(if is_standard(path) { Source::from_bytes(Path::new(STANDARD), standard()?)? } else { Source::open(path)? })
 }
 
-/// The mesh at `path`, at a time step; the first if nobody says.
-pub(crate) fn mesh(path: &Path, time: Option<Time>) -> Result<Mesh> {
+/// So many points of a grid are looked at to choose colours and a view.
+const MOST_SAMPLES: usize = 1 << 16;
+
+/// The mesh at `path`, at a time step, the first if nobody says; of a regular or rectilinear grid that itself, and a mesh
+/// of some of its cells, which colours and views are chosen by. Where the grid's own caster does not draw what is asked for
+/// (`as_mesh`), all of its cells as a mesh.
+pub(crate) fn mesh(path: &Path, time: Option<Time>, as_mesh: bool) -> Result<(Mesh, Option<Grid>)> {
+    match data_set(path, time)? {
+        DataSet::Mesh(mesh) => Ok((mesh, None)),
+        DataSet::Grid(grid) if as_mesh => {
+            tracing::warn!(
+                "the grid is drawn as the tetrahedra of its voxels: its caster knows no second variable and no light"
+            );
+            Ok((grid.into_mesh().with_context(|| path.display().to_string())?, None))
+        }
+        DataSet::Grid(grid) => {
+            let coarse = grid.coarse(MOST_SAMPLES).and_then(Grid::into_mesh);
+            Ok((coarse.with_context(|| path.display().to_string())?, Some(grid)))
+        }
+    }
+}
+
+fn data_set(path: &Path, time: Option<Time>) -> Result<DataSet> {
     progress::during("reading", |report| {
         let source = source(path)?;
         let step = time.map_or(Ok(0), |time| source.step(time))?;
@@ -48,7 +70,7 @@ pub(crate) fn mesh(path: &Path, time: Option<Time>) -> Result<Mesh> {
                 "{path}: the first of {count} time steps is read ({first} to {last}); --time chooses another"
             );
         }
-        Ok(source.read(step, report)?)
+        Ok(source.read_data_set(step, report)?)
     })
 }
 

@@ -141,6 +141,22 @@ pub(crate) fn opacity(text: &str) -> Result<Opacity, String> {
     text.split(',').map(knot).collect::<Result<_, String>>().map(Opacity)
 }
 
+/// An order of reconstruction, by its name.
+pub(crate) fn order(text: &str) -> Result<halite::cast::Order, String> {
+    let all = halite::cast::Order::ALL;
+    let found = all.iter().find(|(name, _)| *name == text).map(|(_, order)| *order);
+    found.ok_or_else(|| format!("there is {}", all.map(|(name, _)| name).join(", ")))
+}
+
+/// Where samples are taken along rays.
+pub(crate) fn sampling(text: &str) -> Result<halite::cast::Sampling, String> {
+    if text == "voxels" {
+        return Ok(halite::cast::Sampling::Voxels);
+    }
+    let step = text.parse().ok().filter(|step: &f64| *step > 0.0 && step.is_finite());
+    step.map(halite::cast::Sampling::Steps).ok_or_else(|| "\"voxels\", or a length above 0".to_owned())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

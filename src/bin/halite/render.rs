@@ -3,8 +3,10 @@ use crate::{camera, input, integral, look, output, parse, progress, variant};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use glam::DVec3;
+use halite::cast::{Order, Reconstruction, Sampling};
 use halite::field::{Association, Component, Field, Kind};
 use halite::gpu::DeviceChoice;
+use halite::grid::Grid;
 use halite::image::{Backdrop, Image};
 use halite::integral::choice::{Choice, Form};
 use halite::io::Time;
@@ -54,6 +56,13 @@ pub(crate) struct Request {
     /// Width and height in pixels [default: the scene's, or 1024x768]
     #[arg(long, value_name = "WxH", value_parser = parse::size)]
     size: Option<[u32; 2]>,
+    /// What stands for the field of a regular or rectilinear grid between samples: itself, parabolas, lines, or rectangles
+    /// by the middle, the left or the right sample [default: exact]
+    #[arg(long, value_name = "ORDER", value_parser = parse::order)]
+    reconstruction: Option<Order>,
+    /// Where such samples are: at faces of voxels and midway, or so many world units apart [default: voxels]
+    #[arg(long, value_name = "voxels|LENGTH", value_parser = parse::sampling, requires = "reconstruction")]
+    sampling: Option<Sampling>,
     /// Stretch the mesh, such as 1,1,50 to exaggerate heights; lengths are as they are seen then
     #[arg(long, value_name = "X,Y,Z", value_parser = parse::factors, allow_hyphen_values = true)]
     scale: Option<DVec3>,
@@ -213,7 +222,7 @@ fn all_times(options: &Options, given: Option<Scene>, renderer: &mut Renderer) -
 fn range_of_all(request: &Request, count: usize) -> Result<Option<[f64; 2]>> {
     let (mut all, mut scalars) = (None::<[f64; 2]>, None);
     for step in 0..count {
-        let mesh = input::mesh(&request.input, Some(Time::Step(step)))?;
+        let (mesh, _) = input::mesh(&request.input, Some(Time::Step(step)), false)?;
         let tetrahedra = Tetrahedra::new(&mesh).with_context(|| request.input.display().to_string())?;
         let scalars = match &scalars {
             Some(first) => first,
@@ -237,7 +246,10 @@ pub(crate) struct Steps {
 
 /// Everything that a picture takes, and how long it took to get.
 pub(crate) struct Job {
+    /// What is drawn; of a grid, some of its cells.
     pub(crate) mesh: Mesh,
+    /// What is drawn in place of the mesh.
+    pub(crate) grid: Option<Grid>,
     pub(crate) tetrahedra: Tetrahedra,
     pub(crate) field: Field,
     pub(crate) scene: Scene,
@@ -256,9 +268,14 @@ fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut Steps) -> R
     let from_file = given.is_some();
     let start = Instant::now();
     let path = given.as_ref().map_or(options.input.clone(), |scene| scene.mesh.clone());
-    let mut mesh = input::mesh(&path, steps.time)?;
+    let of_two = given.as_ref().is_some_and(|scene| !scene.transfer.is_of_one_variable());
+    let (mut mesh, mut grid) = input::mesh(&path, steps.time, of_two)?;
+    if grid.is_none() && options.reconstruction.is_some() {
+        bail!("{}: --reconstruction is for regular and rectilinear grids, and this is a mesh", path.display());
+    }
     if let Some(by) = options.scale {
         mesh = mesh.scaled(by).with_context(|| path.display().to_string())?;
+        grid = grid.map(|grid| grid.scaled(by)).transpose()?;
     }
     let load_ms = ms(start);
     let start = Instant::now();
@@ -283,6 +300,12 @@ fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut Steps) -> R
         let field = scalars.field_with(&mesh, second).with_context(|| path.display().to_string())?;
         options.check(&field)?;
         (scalars, field)
+    };
+    // The field of all of a grid is drawn, and that of some of it looked at.
+    let whole = match &grid {
+        Some(grid) if solid => Some(automatic::solid(grid)?.0),
+        Some(grid) => Some(scalars.field(grid).with_context(|| path.display().to_string())?),
+        None => None,
     };
     let mut scene = match given {
         Some(scene) => look::restyled(options, scene, map)?,
@@ -319,6 +342,14 @@ fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut Steps) -> R
         None => scene.background,
     };
     let legend = if solid { None } else { Legend::new(&scalars, &field, &scene.transfer, options.log) };
+    if let Some(whole) = whole {
+        if options.nan_color.is_some() {
+            bail!(
+                "--nan-color: values that are missing in a regular or rectilinear grid have no colour of their own yet"
+            );
+        }
+        field = whole;
+    }
     if let (Some((color, opacity)), false) = (options.nan_color, solid) {
         let (transfer, blend) = (&scene.transfer, scene.blend);
         if !transfer.is_of_one_variable() {
@@ -332,10 +363,18 @@ fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut Steps) -> R
             }
         }
     }
-    Ok(Job { mesh, tetrahedra, field, scene, legend, load_ms, split_ms })
+    Ok(Job { mesh, grid, tetrahedra, field, scene, legend, load_ms, split_ms })
 }
 
 impl Job {
+    /// The job, if it draws a mesh: `command` knows no grids.
+    pub(crate) fn of_mesh(self, command: &str) -> Result<Self> {
+        if self.grid.is_some() {
+            bail!("halite {command} is for meshes, and this is a regular or rectilinear grid");
+        }
+        Ok(self)
+    }
+
     /// What a legend tells.
     ///
     /// # Errors
@@ -384,6 +423,13 @@ impl Request {
         }
         let engine = engine.into();
         let mut renderer = Renderer::with_engine(threads, device, engine)?;
+        let (order, sampling) = (self.reconstruction.unwrap_or_default(), self.sampling.unwrap_or_default());
+        if order == Order::Exact && sampling != Sampling::Voxels {
+            return Err(output::misuse(
+                "--sampling: the exact reconstruction takes no samples; --reconstruction 2 does",
+            ));
+        }
+        renderer.set_reconstruction(Reconstruction { order, sampling });
         let switches = scene.map_or(Ok(Switches::default()), |s| variant::of_scene(s, &self.input))?;
         renderer.set_switches(self.variant.apply(switches));
         renderer.set_integral(self.choice(scene)?);
@@ -505,14 +551,19 @@ pub(crate) struct Times {
 }
 
 pub(crate) fn draw(job: Job, renderer: &mut Renderer) -> Result<Drawn> {
-    let Job { mesh, tetrahedra, field, scene, load_ms, split_ms, .. } = job;
+    let Job { mesh, grid, tetrahedra, field, scene, load_ms, split_ms, .. } = job;
     let (view, behind) = scene.view()?;
-    renderer.check_room(mesh.points().len(), &tetrahedra)?;
-    progress::during("matching faces", |p| renderer.set_mesh_with_progress(&mesh, tetrahedra, p));
+    match &grid {
+        Some(grid) => renderer.set_grid(grid)?,
+        None => {
+            renderer.check_room(mesh.points().len(), &tetrahedra)?;
+            progress::during("matching faces", |p| renderer.set_mesh_with_progress(&mesh, tetrahedra, p));
+        }
+    }
     renderer.set_field(&field)?;
     renderer.set_transfer(&scene.transfer);
     // The renderer has its own copy, and the meshes that people draw are large.
-    drop((mesh, field));
+    drop((mesh, grid, field));
     let start = Instant::now();
     let image = progress::during("drawing", |p| renderer.render(&view, p))?;
     let times = Times { load: load_ms, split: split_ms, first_frame: ms(start), transfer_edit: None };

@@ -112,7 +112,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     let device = options.request.device(given.as_ref()).or_environment();
     let renderer = Renderer::with_device(threads, DeviceChoice::Cpu)?;
     renderer.install(|| {
-        let job = render::prepare(&options.request, given)?;
+        let job = render::prepare(&options.request, given)?.of_mesh("tables")?;
         let points = job.tetrahedra.points(job.mesh.points());
         let geometry = Geometry::unconnected(&points, &job.tetrahedra);
         let normal = [0, 1, 2, 3].map(|k| job.field.normal(k));

@@ -3,7 +3,7 @@
 use super::curved::{self, Node, Recipe};
 use super::linear::{PRISM_5, PRISM_6, Shape, order, shape, split};
 use super::polyhedron::{Corner, Cut, Solved, Split};
-use super::{Added, Listed, Skipped, dimension, mean, name};
+use super::{Added, Listed, Skipped, dimension, ghosts, mean, name};
 use crate::error::{Error, Result};
 use crate::mesh::{Array, Mesh, POLYHEDRON, Polyhedra};
 use glam::DVec3;
@@ -15,15 +15,6 @@ use std::ops::Range;
 /// rational.
 const DEGREES_ARRAY: &str = "HigherOrderDegrees";
 const WEIGHTS_ARRAY: &str = "RationalWeights";
-
-/// The name of VTK's array that marks ghosts, and its bits (`vtkDataSetAttributes.h`).
-const GHOST_ARRAY: &str = "vtkGhostType";
-/// Its forerunner (before VTK 6.3): more than 0 for ghosts.
-const GHOST_LEVELS_ARRAY: &str = "vtkGhostLevels";
-/// DUPLICATECELL | REFINEDCELL | HIDDENCELL.
-const GHOST_CELL: u8 = 1 | 8 | 32;
-/// HIDDENPOINT.
-const GHOST_POINT: u8 = 2;
 
 /// What happens to a cell.
 enum Fate<'a> {
@@ -44,8 +35,8 @@ type Key = (u8, usize, [usize; 3]);
 pub(super) struct Splitter<'a> {
     mesh: &'a Mesh,
     polyhedra: Option<&'a Polyhedra>,
-    ghost_cells: Option<&'a Array>,
-    ghost_levels: Option<&'a Array>,
+    /// Which cells are ghosts; none if none is.
+    ghosts: Option<Box<dyn Fn(usize) -> bool + Sync + 'a>>,
     degrees: Option<&'a Array>,
     rational: Option<&'a Array>,
     recipes: HashMap<Key, Result<Recipe, String>>,
@@ -71,9 +62,9 @@ impl<'a> Splitter<'a> {
         let find = |arrays: &'a [Array], name: &str, components: usize| {
             arrays.iter().find(|a| a.name == name && a.components == components)
         };
-        let hidden = find(mesh.point_arrays(), GHOST_ARRAY, 1);
+        let hidden = ghosts::of_points(mesh.point_arrays());
         let mark = |(i, p): (usize, &DVec3)| {
-            let hide = hidden.is_some_and(|a| a.values.get(i) as u8 & GHOST_POINT != 0);
+            let hide = hidden.as_ref().is_some_and(|hides| hides(i));
             (if hide { HIDDEN } else { 0 }) | if p.is_finite() { 0 } else { NOT_FINITE }
         };
         let points = || mesh.points().par_iter().enumerate();
@@ -81,8 +72,7 @@ impl<'a> Splitter<'a> {
         let mut splitter = Splitter {
             mesh,
             polyhedra: mesh.polyhedra(),
-            ghost_cells: find(mesh.cell_arrays(), GHOST_ARRAY, 1),
-            ghost_levels: find(mesh.cell_arrays(), GHOST_LEVELS_ARRAY, 1),
+            ghosts: ghosts::of_cells(mesh.cell_arrays()).map(|of| Box::new(of) as Box<dyn Fn(usize) -> bool + Sync>),
             degrees: find(mesh.cell_arrays(), DEGREES_ARRAY, 3),
             rational: find(mesh.point_arrays(), WEIGHTS_ARRAY, 1),
             recipes: HashMap::new(),
@@ -130,8 +120,7 @@ impl<'a> Splitter<'a> {
         if let (Fate::Polyhedron(None), Some(polyhedra)) = (&fate, self.polyhedra) {
             marks = polyhedra.faces(c).flatten().fold(marks, mark);
         }
-        let ghost = self.ghost_cells.is_some_and(|a| a.values.get(c) as u8 & GHOST_CELL != 0)
-            || self.ghost_levels.is_some_and(|a| a.values.get(c) > 0.0);
+        let ghost = self.ghosts.as_ref().is_some_and(|of| of(c));
         Ok(if ghost || marks & HIDDEN != 0 {
             Fate::Ghost
         } else if marks & NOT_FINITE != 0 {

@@ -63,7 +63,7 @@ pub(super) fn run(options: &Options, threads: usize) -> Result<()> {
     let size = options.request.studied(given.as_ref())?;
     let device = options.request.device(given.as_ref());
     let mut judge = Renderer::with_device(threads, DeviceChoice::Cpu)?;
-    let job = judge.install(|| render::prepare(&options.request, given))?;
+    let job = judge.install(|| render::prepare(&options.request, given)?.of_mesh("study"))?;
     let (view, _) = job.scene.view()?;
     let truth = progress::during("judging", |p| {
         set(&mut judge, &job)?;
