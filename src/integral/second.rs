@@ -223,6 +223,13 @@ impl Second {
 
     /// Adds `segment` to `light`.
     pub(crate) fn add(&self, segment: &Segment, scratch: &mut Scratch, light: &mut Gathered<f32>) {
+        // Of many panels, f32 would round each.
+        let mut own = Gathered::none();
+        self.gather(segment, scratch, &mut own);
+        light.add(own.color.map(|c| c as f32), (1.0 - own.through) as f32);
+    }
+
+    fn gather(&self, segment: &Segment, scratch: &mut Scratch, light: &mut Gathered<f64>) {
         let Ready::Widgets(widgets) = &self.source else {
             self.smooth(segment, [0.0, 1.0], scratch, light);
             return;
@@ -243,7 +250,7 @@ impl Second {
                     let widget = &widgets[one].widget;
                     let depth = self.depth(widget, segment, [u, next]);
                     let opacity = -(-depth).exp_m1();
-                    light.add(widget.color.map(|c| (c * opacity) as f32), opacity as f32);
+                    light.add(widget.color.map(|c| c * opacity), opacity);
                 }
                 _ => self.smooth(segment, [u, next], scratch, light),
             }

@@ -23,8 +23,8 @@ const ANGLES: [f64; 2] = [0.35, 1.2];
 const SHORTEST: f64 = 1e-7;
 /// See [`SHORTEST`].
 const THINNEST: f64 = 1e-14;
-/// Transmittance below which f32 tells nothing from nothing.
-const DARK: f32 = 1e-12;
+/// Transmittance of a segment below which f32 tells nothing from nothing.
+const DARK: f64 = 1e-12;
 /// Places of a segment that are one.
 const SAME: f64 = 1e-12;
 
@@ -107,7 +107,7 @@ fn pass_knot<T>(knots: &[(f64, T)], at: f64, rise: f64, u: f64) -> f64 {
 
 impl Second {
     /// Adds the part of `segment` between `ends`, where the widgets of `scratch.active` are.
-    pub(super) fn smooth(&self, segment: &Segment, ends: [f64; 2], scratch: &mut Scratch, light: &mut Gathered<f32>) {
+    pub(super) fn smooth(&self, segment: &Segment, ends: [f64; 2], scratch: &mut Scratch, light: &mut Gathered<f64>) {
         let mut u = ends[0];
         while u < ends[1] && light.through > DARK {
             let next = self.next(segment, &scratch.active, u).min(ends[1]);
@@ -190,7 +190,7 @@ impl Second {
     }
 
     /// Adds panels until the piece is done, and counts them.
-    fn panels(&self, segment: &Segment, piece: &Piece, light: &mut Gathered<f32>) -> u64 {
+    fn panels(&self, segment: &Segment, piece: &Piece, light: &mut Gathered<f64>) -> u64 {
         let [begin, end] = piece.ends;
         let longest = (end - begin) / ((end - begin) * self.rate(segment, piece)).ceil().max(1.0);
         let (mut u, mut h, mut count) = (begin, longest, 0);
@@ -226,7 +226,7 @@ impl Second {
             let opacity = -(-depth).exp_m1();
             // What one colour emits is that times the opacity, whatever the nodes miss of it.
             let right = if self.direct.is_none() && absorbed > 0.0 { opacity / absorbed } else { 1.0 };
-            light.add(emitted.map(|c| (c * right) as f32), opacity as f32);
+            light.add(emitted.map(|c| c * right), opacity);
             count += 1;
             u += h;
             h = (2.0 * h).min(longest);
