@@ -17,6 +17,7 @@ mod batch;
 pub mod choice;
 mod knots;
 pub mod lookup;
+pub(crate) mod second;
 pub mod table;
 #[cfg(test)]
 mod tests;

@@ -33,7 +33,7 @@ impl Legend {
     /// The legend of `field`, which `scalars` are; none if its colours are its own, or there is one at most.
     pub(crate) fn new(scalars: &Scalars, field: &Field, transfer: &TransferFunction, log: bool) -> Option<Self> {
         let (first, last) = (transfer.color().first()?.0, transfer.color().last()?.0);
-        if field.kind() == Kind::Rgba || first >= last {
+        if field.kind() == Kind::Rgba || first >= last || !transfer.has_knots() {
             return None;
         }
         let axis = if log { Axis::logarithmic([first, last]).ok()? } else { Axis::linear([first, last]) };

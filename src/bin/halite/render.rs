@@ -222,7 +222,8 @@ pub(crate) fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut 
     let from_file = given.is_some();
     let start = Instant::now();
     let path = given.as_ref().map_or(options.input.clone(), |scene| scene.mesh.clone());
-    let (mut mesh, mut grid) = input::mesh(&path, steps.time)?;
+    let of_two = given.as_ref().is_some_and(|scene| !scene.transfer.is_of_one_variable());
+    let (mut mesh, mut grid) = input::mesh(&path, steps.time, of_two)?;
     if grid.is_none() && options.reconstruction.is_some() {
         bail!("{}: --reconstruction is for regular and rectilinear grids, and this is a mesh", path.display());
     }
@@ -249,7 +250,8 @@ pub(crate) fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut 
             None => options.scalars(given.as_ref(), &mesh)?,
         };
         steps.scalars = Some(scalars.clone());
-        let field = scalars.field(&mesh).with_context(|| path.display().to_string())?;
+        let second = given.as_ref().and_then(|scene| scene.gradient_array.as_deref());
+        let field = scalars.field_with(&mesh, second).with_context(|| path.display().to_string())?;
         options.check(&field)?;
         (scalars, field)
     };
@@ -305,6 +307,9 @@ pub(crate) fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut 
     }
     if let (Some((color, opacity)), false) = (options.nan_color, solid) {
         let (transfer, blend) = (&scene.transfer, scene.blend);
+        if !transfer.is_of_one_variable() {
+            bail!("--nan-color: the scene has a second variable or light, of which missing values have none");
+        }
         let shown = missing::shown(&mesh, &tetrahedra, &scalars, transfer, blend, color, opacity)?;
         if let Some(shown) = shown {
             (field, scene.transfer) = (shown.field, shown.transfer);

@@ -203,7 +203,7 @@ impl<const N: usize> Canvas<N> {
                     let mut next = first_x;
                     for bx in x0 / 4..=x1 / 4 {
                         let x = next;
-                        next = next + of(4.0);
+                        next += 4.0;
                         if blocks >> bx & 1 == 0 {
                             continue;
                         }

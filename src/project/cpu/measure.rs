@@ -174,12 +174,13 @@ impl Waiting {
         let count = std::mem::take(&mut self.count).min(WAITING - 8);
         let sum = if direct { &self.sum } else { &self.alpha };
         let absorbed = f32x4::load_array(simd, [0.0, 0.0, 0.0, -1.0]);
-        for i in 0..count {
-            let id = self.id[i] as u32;
+        let pieces = self.id[..count].iter().zip(&sum[..count]).zip(&self.alpha[..count]).zip(&self.moment[..count]);
+        for (((&id, &sum), &alpha), &moment) in pieces {
+            let id = id as u32;
             let Some([value, slope]) = colors.get((id >> 16) as usize) else { continue };
             let (value, slope) = (f32x4::load_array_ref(simd, value), f32x4::load_array_ref(simd, slope));
-            let lit = slope.mul_add(f32x4::splat(simd, self.moment[i]), value * sum[i]);
-            let lit = absorbed.mul_add(f32x4::splat(simd, self.alpha[i]), lit);
+            let lit = slope.mul_add(f32x4::splat(simd, moment), value * sum);
+            let lit = absorbed.mul_add(f32x4::splat(simd, alpha), lit);
             let pixel = &mut light[id as usize % PIXELS];
             let transmittance = f32x4::splat(simd, pixel[3]);
             transmittance.mul_add(lit, f32x4::load_array_ref(simd, pixel)).store_array(pixel);

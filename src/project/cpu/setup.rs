@@ -256,8 +256,8 @@ pub(super) fn set_up<S: Simd, const N: usize>(
     for some in cells.chunks(TOGETHER) {
         for (&cell, read) in some.iter().zip(&mut read) {
             let corners = scene.geometry.cells[cell as usize].corners;
-            for k in 0..4 {
-                read.corners[k] = scene.geometry.points[corners[k] as usize];
+            for (to, from) in read.corners.iter_mut().zip(corners) {
+                *to = scene.geometry.points[from as usize];
             }
             read.values = scene.corner_values(cell, corners);
         }
@@ -293,8 +293,8 @@ fn set_up_four<S: Simd, const N: usize>(
     let mut from = [zero, zero, [1.0; 4]];
     let mut edge = [[zero; 3]; 3];
     let mut first = [0_usize; 4];
-    for l in 0..cells.len() {
-        relative(lens, &read[l].corners, l, &mut from, &mut edge);
+    for (l, read) in read[..cells.len()].iter().enumerate() {
+        relative(lens, &read.corners, l, &mut from, &mut edge);
     }
     let of = |v: f64| f64x4::splat(simd, v);
     let (none, one) = (of(0.0), of(1.0));
@@ -382,9 +382,9 @@ fn set_up_four<S: Simd, const N: usize>(
     let mut finite = f32x4::splat(simd, 0.0);
     for n in 0..N {
         let mut v = [[0.0; 4]; 4];
-        for l in 0..cells.len() {
-            for k in 0..4 {
-                v[k][l] = read[l].values[k][n];
+        for (l, read) in read[..cells.len()].iter().enumerate() {
+            for (v, value) in v.iter_mut().zip(&read.values) {
+                v[l] = value[n];
             }
         }
         let start = wide(simd, v[0]);
