@@ -61,7 +61,10 @@ fn what_cannot_be_is_refused() {
     place.fails("render scene.json --out x.png --device cpu --gradient-array v", &["--gradient-array", "--widget"]);
     place.fails("render scene.json --out x.png --device cpu --shade --blend maximum", &["a maximum along rays"]);
     place.fails("render cube.vtu --out x.png --device cpu --scalars c --shade", &["values of cells have no gradient"]);
-    place.fails("render scene.json --out x.png --device cpu --silhouette 1 --gradient-array none", &["\"none\""]);
+    place.fails(
+        "render scene.json --out x.png --device cpu --gradient-opacity 0:1 --gradient-array none",
+        &["\"none\""],
+    );
     let widget = "--widget uniform:opacity=0.5 --range 0:1";
     place.succeeds(&format!("render cube.vtu --out x.png --device cpu --size 8x8 {widget}"));
 }
@@ -82,8 +85,12 @@ fn a_histogram_shows_where_values_are() {
         let (i, j) = ((x * 60.0) as u32, ((1.0 - y) * 40.0) as u32);
         image.pixels[((top + j) * w + left + i) as usize]
     };
-    assert!(at(&plain, 0.5, 0.5)[0] > 0.3, "much of it has the middle of both");
-    assert_eq!(at(&plain, 0.1, 0.9)[0], 0.0, "nothing is longer than it is large");
+    let around = |x: f64, y: f64| {
+        let near = (0..81).map(|i| [f64::from(i % 9 - 4) / 60.0, f64::from(i / 9 - 4) / 40.0]);
+        near.map(|[i, j]| at(&plain, x + i, y + j)[0]).fold(0.0, f32::max)
+    };
+    assert!(around(0.5, 0.5) > 0.3, "much of it has the middle of both");
+    assert_eq!(around(0.1, 0.85), 0.0, "nothing is longer than it is large");
     // A widget is drawn on it in its colour, where it is.
     let marked = draw("--widget uniform:s=0,3:g=1,2:color=1,0,0");
     let pixel = at(&marked, 0.1, 0.9);

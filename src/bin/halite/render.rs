@@ -173,6 +173,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     }
     let request = &options.request;
     let given = request.scene()?;
+    request.second.check(given.as_ref())?;
     let mut renderer = request.renderer(threads, given.as_ref(), request.device(given.as_ref()))?;
     request.check_room(given.as_ref())?;
     let report = if options.all_times {

@@ -5,10 +5,10 @@ use anyhow::{Result, bail};
 use clap::Args;
 use halite::field::{Field, Gradient};
 use halite::mesh::{Mesh, cells::Tetrahedra};
-use halite::scene::{automatic::Opacity, widget};
+use halite::scene::{Scene, automatic::Opacity, widget};
+use halite::transfer::TransferFunction;
 use halite::transfer::bivariate::Widget;
 use halite::transfer::shading::{Light, Shade};
-use halite::transfer::{Bivariate, TransferFunction};
 use serde_json::{Map, Value, json};
 
 #[derive(Args)]
@@ -85,6 +85,16 @@ impl Second {
         function || self.shade.is_some() || self.silhouette.is_some()
     }
 
+    /// Refuses an array that no function looks at, in a picture of `scene` or of a mesh alone.
+    pub(crate) fn check(&self, scene: Option<&Scene>) -> Result<()> {
+        let asked = self.gradient_opacity.is_some() || !self.widget.is_empty();
+        let of_two = asked || scene.is_some_and(|s| s.transfer.bivariate().is_some());
+        if self.gradient_array.is_some() && !of_two {
+            bail!("--gradient-array: nothing asks for a second variable; --gradient-opacity and --widget do");
+        }
+        Ok(())
+    }
+
     /// The widgets that were asked for.
     pub(crate) fn widgets(&self) -> Result<Vec<Widget>> {
         let widgets = self.widget.iter().enumerate().map(|(i, w)| w.widget(i));
@@ -115,9 +125,6 @@ impl Second {
         if let Some(shade) = self.shade {
             let lights = if shading.lights().is_empty() { vec![Light::default()] } else { shading.lights().to_vec() };
             shading = shading.with_lights(shade, lights)?;
-        }
-        if self.gradient_array.is_some() && bivariate == Bivariate::default() {
-            bail!("--gradient-array: nothing asks for a second variable; --gradient-opacity and --widget do");
         }
         Ok(transfer.with_bivariate(bivariate).with_shading(shading))
     }
