@@ -1,6 +1,7 @@
 //! The field that is drawn: one array of a mesh, reduced to a scalar, a (colour, opacity) pair or RGBA.
 
 pub mod gradient;
+pub mod histogram;
 pub(crate) mod normal;
 
 use crate::error::{Error, Result};

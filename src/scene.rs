@@ -18,6 +18,7 @@ mod second;
 
 pub use opaque::Opaque;
 pub use reader::read;
+pub use second::widget;
 
 use crate::error::{Error, Result};
 use crate::field::{Association, Component, Field};

@@ -1,11 +1,13 @@
 //! What a scene says of a second variable, light and silhouettes.
 
+use super::read;
 use crate::error::{Error, Result};
 use crate::image::npy::Npy;
 use crate::transfer::bivariate::{Bivariate, OPEN, Shape, Sine, Table, Wave, Widget};
 use crate::transfer::shading::{Light, Origin, Shade, Shading};
 use serde::de::Visitor;
 use serde::{Deserialize, Deserializer};
+use serde_json::Value;
 use std::fmt::{self, Formatter};
 use std::path::{Path, PathBuf};
 
@@ -36,6 +38,16 @@ impl<'de> Deserialize<'de> for End {
         }
         from.deserialize_newtype_struct(OPEN_END, OrNull)
     }
+}
+
+/// A widget as scenes write it, such as `{"type": "uniform", "color": [1, 0, 0], "opacity": 0.5}`.
+///
+/// # Errors
+/// What is wrong, and where in the value.
+pub fn widget(value: &Value) -> Result<Widget, String> {
+    let widget = read::<WidgetJson>(value)?.widget()?;
+    widget.check()?;
+    Ok(widget)
 }
 
 /// A range that may be open.

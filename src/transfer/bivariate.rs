@@ -142,7 +142,8 @@ impl Widget {
         if self.holds(at) { self.height(at) } else { 0.0 }
     }
 
-    fn check(&self) -> Result<(), String> {
+    /// Says what is wrong with it, if anything.
+    pub(crate) fn check(&self) -> Result<(), String> {
         if let Some(c) = self.color.iter().find(|c| !(0.0..=1.0).contains(*c)) {
             return Err(format!("color: red, green and blue are 0 to 1, and one is {c}"));
         }
