@@ -132,7 +132,7 @@ struct vtkHaliteMapper::Internals
   Frame& FrameOf(vtkRenderer* renderer, vtkVolume* volume);
   // Lets go what was made for a window: at once, or when the frame that is at work is over.
   void Release(vtkWindow* window);
-  Content Choose(vtkUnstructuredGridBase* grid, vtkVolume* volume);
+  Content Choose(vtkDataSet* grid, vtkVolume* volume);
   // Draws once the renderer has finished.
   void PutOff(vtkRenderer* renderer, vtkVolume* volume);
 
