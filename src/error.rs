@@ -84,6 +84,9 @@ pub enum Error {
 
 impl Error {
     pub(crate) fn file(path: &Path, answer: std::io::Error) -> Self {
+        if answer.kind() == std::io::ErrorKind::OutOfMemory {
+            return Error::NoMemory(format!("there is not enough memory for {}", path.display()));
+        }
         Error::File { path: path.to_owned(), answer }
     }
 

@@ -17,6 +17,7 @@ use crate::host::{Log, Session, carried, guard, named};
 use crate::image::{Backdrop, Image};
 use crate::integral::Choice;
 use crate::integral::choice::Form;
+use crate::memory;
 use crate::mesh::cells::name;
 use crate::mesh::{Array, Cells, Mesh, Polyhedra, Values};
 use crate::transfer::{Convention, TransferFunction};
@@ -204,7 +205,11 @@ fn open_mesh(path: &str, threads: usize, log: &Log) -> Result<Box<Mesh>> {
 fn new_mesh(points: Numbers, types: &[u8], offsets: Numbers, connectivity: Numbers) -> Result<Box<Mesh>> {
     guard(|| {
         let connectivity = point_ids(connectivity)?;
-        let cells = Cells { types: types.to_vec(), offsets: indices("offsets", offsets)?, connectivity };
+        let cells = Cells {
+            types: memory::copied("the types of cells", types)?,
+            offsets: indices("offsets", offsets)?,
+            connectivity,
+        };
         Mesh::new(triples(&points)?, cells, vec![], vec![]).map(Box::new)
     })
 }
@@ -261,6 +266,7 @@ fn arrays(mesh: &Mesh) -> Result<Vec<ArrayInfo>> {
 fn array_values(mesh: &Mesh, index: usize) -> Result<Vec<f64>> {
     guard(|| {
         let (_, array) = array(mesh, index)?;
+        memory::check_array::<f64>("the values of an array", array.values.len())?;
         Ok((0..array.values.len()).map(|i| array.values.get(i)).collect())
     })
 }
@@ -275,7 +281,10 @@ fn cell_counts(mesh: &Mesh) -> Result<Vec<CellCount>> {
 }
 
 fn points(mesh: &Mesh) -> Result<Vec<f64>> {
-    guard(|| Ok(mesh.points().iter().flat_map(DVec3::to_array).collect()))
+    guard(|| {
+        memory::check_array::<DVec3>("the points of a mesh", mesh.points().len())?;
+        Ok(mesh.points().iter().flat_map(DVec3::to_array).collect())
+    })
 }
 
 fn types(mesh: &Mesh) -> Result<Vec<u8>> {

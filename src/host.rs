@@ -163,6 +163,7 @@ impl Session {
         tetrahedra.log();
         self.mirrored = matrix.determinant() < 0.0;
         let moved = (matrix != DMat4::IDENTITY).then(|| self.renderer.install(|| transformed(mesh.points(), matrix)));
+        let moved = moved.transpose()?;
         self.renderer.check_room(mesh.points().len(), &tetrahedra)?;
         match moved {
             None => self.renderer.set_mesh(mesh, tetrahedra),
@@ -189,7 +190,7 @@ impl Session {
             State::Empty => Ok(true),
             State::Mesh if self.mirrored != (matrix.determinant() < 0.0) => Ok(false),
             State::Mesh => {
-                let moved = self.renderer.install(|| transformed(points, matrix));
+                let moved = self.renderer.install(|| transformed(points, matrix))?;
                 self.renderer.set_points(&moved).map(|()| true)
             }
         }
@@ -274,8 +275,9 @@ fn not_finite(points: &[DVec3]) -> Vec<usize> {
 }
 
 /// `points` under an affine matrix; those that are not finite stay so.
-fn transformed(points: &[DVec3], matrix: DMat4) -> Vec<DVec3> {
-    points.par_iter().map(|&p| matrix.transform_point3(p)).collect()
+fn transformed(points: &[DVec3], matrix: DMat4) -> Result<Vec<DVec3>> {
+    crate::memory::check_array::<DVec3>("the points where they are drawn", points.len())?;
+    Ok(points.par_iter().map(|&p| matrix.transform_point3(p)).collect())
 }
 
 #[cfg(test)]
@@ -338,7 +340,7 @@ mod tests {
             let offsets = (0..=types.len() as u64).map(|i| 4 * i).collect();
             let connectivity = split.corners.as_flattened().to_vec();
             let cells = crate::mesh::Cells { types, offsets, connectivity };
-            let moved = Mesh::new(transformed(tets.points(), matrix), cells, vec![], vec![]).unwrap();
+            let moved = Mesh::new(transformed(tets.points(), matrix).unwrap(), cells, vec![], vec![]).unwrap();
             let mut plain = session();
             plain.set_mesh(&moved, DMat4::IDENTITY).unwrap();
             set_field(&mut plain, &tets);

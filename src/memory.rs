@@ -1,10 +1,15 @@
 //! How much memory may still be had, asked before much of it is taken: an error then, and not the end of the process.
 
 use crate::error::{Error, Result};
+use bytemuck::Zeroable;
 use std::cell::Cell;
+use std::fmt::Display;
 
 /// What is left for small things besides the large ones that are asked for.
 const RESERVE: u64 = 16 << 20;
+
+/// Arrays of so many bytes are small.
+const ASKED: u64 = 1 << 20;
 
 thread_local! {
     static TRIES: Cell<bool> = const { Cell::new(false) };
@@ -26,23 +31,71 @@ pub fn check(what: &str, bytes: u64) -> Result<()> {
     }
 }
 
+/// As [`check`], for `count` values of type `T`. What is small is not asked for: that costs more than it may save.
+///
+/// # Errors
+/// [`Error::NoMemory`] if they cannot be had.
+pub fn check_array<T>(what: impl Display, count: usize) -> Result<()> {
+    match bytes::<T>(count) {
+        bytes if bytes > ASKED => check(&what.to_string(), bytes),
+        _ => Ok(()),
+    }
+}
+
 /// `count` times `value`, for `what`.
 ///
 /// # Errors
 /// [`Error::NoMemory`] if there is not enough memory.
-pub fn filled<T: Clone>(what: &str, value: T, count: usize) -> Result<Vec<T>> {
-    let bytes = (count as u64).saturating_mul(size_of::<T>() as u64);
-    // What is small is had, or nothing is; asking costs more.
-    if bytes > RESERVE {
-        check(what, bytes)?;
-    }
+pub fn filled<T: Clone>(what: impl Display, value: T, count: usize) -> Result<Vec<T>> {
     let mut list = Vec::new();
-    let before = TRIES.replace(true);
-    let taken = list.try_reserve_exact(count);
-    TRIES.set(before);
-    taken.map_err(|_| lacking(what, bytes, available()))?;
+    reserve(what, &mut list, count)?;
     list.resize(count, value);
     Ok(list)
+}
+
+/// `count` zeros, for `what`. The system gives each page when it is written, to the thread that writes it.
+///
+/// # Errors
+/// [`Error::NoMemory`] if there is not enough memory.
+pub fn zeroed<T: Zeroable>(what: impl Display, count: usize) -> Result<Vec<T>> {
+    check_array::<T>(&what, count)?;
+    trying(|| bytemuck::try_zeroed_vec(count)).map_err(|()| lacking(&what.to_string(), bytes::<T>(count), available()))
+}
+
+/// Makes room for `count` values more at the end of `list`, and for no others.
+///
+/// # Errors
+/// [`Error::NoMemory`] if there is not enough memory.
+pub fn reserve<T>(what: impl Display, list: &mut Vec<T>, count: usize) -> Result<()> {
+    if count <= list.capacity() - list.len() {
+        return Ok(());
+    }
+    let all = list.len().saturating_add(count);
+    check_array::<T>(&what, all)?;
+    trying(|| list.try_reserve_exact(count)).map_err(|_| lacking(&what.to_string(), bytes::<T>(all), available()))
+}
+
+/// A copy of a slice, for `what`.
+///
+/// # Errors
+/// [`Error::NoMemory`] if there is not enough memory.
+pub fn copied<T: Clone>(what: impl Display, from: &[T]) -> Result<Vec<T>> {
+    let mut list = Vec::new();
+    reserve(what, &mut list, from.len())?;
+    list.extend_from_slice(from);
+    Ok(list)
+}
+
+fn bytes<T>(count: usize) -> u64 {
+    (count as u64).saturating_mul(size_of::<T>() as u64)
+}
+
+/// Takes memory whose lack is dealt with.
+fn trying<T>(take: impl FnOnce() -> T) -> T {
+    let before = TRIES.replace(true);
+    let taken = take();
+    TRIES.set(before);
+    taken
 }
 
 fn lacking(what: &str, needed: u64, available: Option<u64>) -> Error {
@@ -104,6 +157,12 @@ mod tests {
         assert_eq!(filled("a list", 7_u8, 3).unwrap(), [7; 3]);
         let message = filled("a picture", [0.0_f32; 4], 1 << 58).unwrap_err().to_string();
         assert!(message.contains("a picture") && message.contains("GB are needed"), "{message}");
+        assert_eq!(zeroed::<u64>("a list", 3).unwrap(), [0; 3]);
+        assert_eq!(copied("a list", &[1, 2]).unwrap(), [1, 2]);
+        assert!(zeroed::<u64>("points", 1 << 58).unwrap_err().to_string().contains("points"));
+        let mut list = vec![1_u8];
+        reserve("a list", &mut list, 7).unwrap();
+        assert!(list.capacity() >= 8 && reserve("a list", &mut list, 1 << 60).is_err() && list == [1]);
         check("a little", 1 << 10).unwrap();
         if available().is_some() {
             assert!(check("a lot", 1 << 60).unwrap_err().to_string().contains("are left"));

@@ -346,6 +346,16 @@ impl Mesh {
         Ok(self)
     }
 
+    /// Bytes that its points, cells and arrays take.
+    pub(crate) fn bytes(&self) -> u64 {
+        let values = |array: &Array| with_values!(&array.values, v => size_of_val(&**v));
+        let arrays: usize = self.point_arrays.iter().chain(&self.cell_arrays).map(values).sum();
+        let Cells { types, offsets, connectivity } = &self.cells;
+        let cells = size_of_val(&**types) + size_of_val(&**offsets) + size_of_val(&**connectivity);
+        let faces = |p: &Polyhedra| size_of_val(&*p.cells) + size_of_val(&*p.faces) + size_of_val(&*p.points);
+        (size_of_val(&*self.points) + arrays + cells + self.polyhedra.as_ref().map_or(0, faces)) as u64
+    }
+
     /// The points, in world coordinates.
     pub fn points(&self) -> &[DVec3] {
         &self.points

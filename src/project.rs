@@ -5,11 +5,7 @@
 //! a test bed, in which each published variant can be switched on: [`Switches`] are what differs.
 
 pub(crate) mod cpu;
-mod frame;
 pub(crate) mod gpu;
-mod keys;
-mod lines;
-mod record;
 
 use serde::{Deserialize, Serialize};
 
@@ -109,6 +105,8 @@ pub(crate) struct Counts {
     pub(crate) cells: u64,
     /// Finding the cells that are seen and sorting them; 0 where the order was known.
     pub(crate) order_ms: f64,
+    /// How often cells were sorted.
+    pub(crate) sorts: u32,
     /// By the device's own clock, where it has one, or in software the host's: projecting all cells of the order, and
     /// drawing them.
     pub(crate) project_ms: Option<f64>,

@@ -1,7 +1,10 @@
 //! The whole flow behind one door: mesh, field, transfer function and view in, image out.
 
+mod answer;
 mod backend;
+mod frame;
 mod grid;
+mod loaded;
 mod prepared;
 mod stats;
 mod tables;
@@ -14,17 +17,19 @@ use crate::gpu::Part;
 use crate::gpu::table::builds;
 use crate::gpu::{DeviceChoice, Gpu};
 use crate::image::Image;
-use crate::integral::{Choice, Exact, Form, Lookup, lookup};
+use crate::integral::{Choice, Exact, Form, lookup};
 use crate::memory;
 use crate::mesh::Mesh;
 use crate::mesh::cells::Tetrahedra;
-use crate::mesh::faces::Faces;
 use crate::project::Switches;
 use crate::transfer::TransferFunction;
 use crate::view::{Blend, View};
+pub use answer::Answer;
 use backend::{Backend, Drawn};
+use frame::Frame;
 use glam::DVec3;
 use grid::LoadedGrid;
+use loaded::Loaded;
 use prepared::{AnyValues, Prepared};
 pub use stats::{ProjectionStats, Stats, SweepStats};
 use std::ops::ControlFlow;
@@ -74,68 +79,6 @@ pub struct Renderer {
 
 /// What a caller is told of, and answers to.
 type Progress<'a> = dyn Fn(f64) -> ControlFlow<()> + Sync + 'a;
-
-/// What may come back from whoever is told the progress.
-pub trait Answer {
-    /// Whether no more is wanted.
-    fn stops(self) -> bool;
-}
-
-impl Answer for () {
-    fn stops(self) -> bool {
-        false
-    }
-}
-
-impl Answer for ControlFlow<()> {
-    fn stops(self) -> bool {
-        self.is_break()
-    }
-}
-
-/// The mesh that is drawn.
-#[derive(Debug)]
-struct Loaded {
-    tetrahedra: Tetrahedra,
-    geometry: Geometry,
-    points: usize,
-    cells: usize,
-    /// Whether cells know their neighbours.
-    connected: bool,
-    /// Whether it is too flat for a device, whose lengths are of 32 bits.
-    flat: bool,
-    /// The longest edge of a cell, in normalised units, once somebody asked.
-    longest: Option<f64>,
-}
-
-impl Loaded {
-    /// `tetrahedra` of `points`, of a mesh of so many cells; `connected` if anything but a device draws it.
-    fn new(
-        points: &[DVec3],
-        cells: usize,
-        tetrahedra: Tetrahedra,
-        connected: bool,
-        on_device: bool,
-        report: &(dyn Fn(f64) + Sync),
-    ) -> Self {
-        let count = points.len();
-        let points = tetrahedra.points(points);
-        let mut geometry = Geometry::default();
-        if !connected {
-            geometry = Geometry::unconnected(&points, &tetrahedra);
-        }
-        let flat = !connected && geometry.is_flat();
-        let connected = connected || flat;
-        if connected {
-            // Laying the mesh out takes about as long as matching its faces.
-            let faces = Faces::with_progress(&points, &tetrahedra.corners, &|share| report(share / 2.0));
-            geometry = Geometry::new(&points, &tetrahedra, &faces);
-        }
-        let flat = on_device && geometry.is_flat();
-        drop(points);
-        Loaded { tetrahedra, geometry, points: count, cells, connected, flat, longest: None }
-    }
-}
 
 impl Renderer {
     /// A renderer on `threads` threads of its own (0: one for each core) and the best device.
@@ -202,12 +145,12 @@ impl Renderer {
         if self.grid.is_some() {
             return self.name_caster();
         }
-        let flat = self.mesh.as_ref().is_some_and(|m| m.flat);
-        self.stats.engine = if flat { Backend::without_device().engine() } else { self.backend.engine() }.into();
-        if flat && self.backend.gpu().is_some() && self.stats.device != "cpu" {
+        let walks = self.mesh.as_ref().is_some_and(|m| m.left_to_walk);
+        self.stats.engine = if walks { Backend::without_device().engine() } else { self.backend.engine() }.into();
+        if walks && self.backend.gpu().is_some() && self.stats.device != "cpu" {
             tracing::warn!("the mesh is too flat for the 32-bit floats of a device; the CPU draws it, by the walk");
         }
-        (self.stats.device, self.stats.adapter) = match self.backend.gpu().filter(|_| !flat) {
+        (self.stats.device, self.stats.adapter) = match self.backend.gpu().filter(|_| !walks) {
             Some(gpu) => ("gpu".into(), gpu.adapter.name.clone()),
             None => ("cpu".into(), format!("{} threads", self.pool.current_num_threads())),
         };
@@ -268,8 +211,8 @@ impl Renderer {
     ) {
         self.grid = None;
         let start = Instant::now();
-        let (connected, on_device) = (self.backend.needs_neighbours(), self.backend.gpu().is_some());
-        let mesh = self.pool.install(|| Loaded::new(points, cells, tetrahedra, connected, on_device, report));
+        let needs = self.backend.needs();
+        let mesh = self.pool.install(|| Loaded::new(points, cells, tetrahedra, needs, report));
         report(1.0);
         self.stats.faces_ms = ms(start);
         self.stats.cells = cells as u64;
@@ -302,8 +245,8 @@ impl Renderer {
         self.pool.install(|| mesh.geometry.set_points(&moved));
         let scaled = mesh.geometry.scale != scale;
         (mesh.longest, self.key) = (None, None);
-        mesh.flat = self.backend.gpu().is_some() && mesh.geometry.is_flat();
-        if mesh.flat && !mesh.connected {
+        mesh.left_to_walk = !self.backend.needs().are_met_by(&mesh.geometry);
+        if mesh.left_to_walk && !mesh.connected {
             return self.connect(points);
         }
         self.name_device();
@@ -315,7 +258,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// Finds the neighbours of cells of a mesh that has become too flat for a device; its points are these.
+    /// Finds the neighbours of cells of a mesh that the backend leaves to the walk now; its points are these.
     fn connect(&mut self, points: &[DVec3]) -> Result<()> {
         let field = self.field.take();
         if let Some(Loaded { tetrahedra, cells, .. }) = self.mesh.take() {
@@ -447,8 +390,9 @@ impl Renderer {
         }
         let start = Instant::now();
         let missing = |what: &str| Error::Render(format!("there is no {what} to draw"));
-        let flat = self.mesh.as_ref().is_some_and(|m| m.flat);
-        let on_device = !flat && !self.host_builds && self.backend.gpu().is_some_and(|gpu| builds(gpu, &self.integral));
+        let walks = self.mesh.as_ref().is_some_and(|m| m.left_to_walk);
+        let on_device =
+            !walks && !self.host_builds && self.backend.gpu().is_some_and(|gpu| builds(gpu, &self.integral));
         self.fit_values()?;
         let mesh = self.mesh.as_mut().ok_or_else(|| missing("mesh"))?;
         let field = self.field.as_ref().ok_or_else(|| missing("field"))?;
@@ -509,7 +453,7 @@ impl Renderer {
         let frame = Frame { mesh, field, transfer, exact, table, view, switches, progress };
         let uploaded = self.backend.gpu().map_or(0, Gpu::uploaded);
         let mut walk = Backend::without_device();
-        let backend = if mesh.flat { &mut walk } else { &mut self.backend };
+        let backend = if mesh.left_to_walk { &mut walk } else { &mut self.backend };
         let drawn = self.pool.install(|| match &field.values {
             AnyValues::Scalar(v) => backend.draw(&frame, v),
             AnyValues::Pair(v) => backend.draw(&frame, v),
@@ -544,29 +488,6 @@ impl Renderer {
     /// What the last calls did.
     pub fn stats(&self) -> &Stats {
         &self.stats
-    }
-}
-
-/// Everything that a frame depends on.
-struct Frame<'a> {
-    mesh: &'a Loaded,
-    field: &'a Prepared,
-    transfer: &'a TransferFunction,
-    exact: &'a Exact<f32>,
-    table: Option<&'a Arc<Lookup>>,
-    view: &'a View,
-    switches: &'a Switches,
-    progress: &'a Progress<'a>,
-}
-
-impl Frame<'_> {
-    /// The pixel of a ray whose largest values are `v`: colour and opacity there, premultiplied.
-    fn largest<const N: usize>(&self, v: &[f32; N]) -> [f32; 4] {
-        let own = |k: usize| self.field.normal()[k].invert(f64::from(v[k]));
-        let [r, g, b] =
-            if N == 4 { [own(0), own(1), own(2)].map(|c| c.clamp(0.0, 1.0)) } else { self.transfer.color_at(own(0)) };
-        let a = self.transfer.opacity_at(own(N - 1)).min(1.0);
-        [r * a, g * a, b * a, a].map(|c| c as f32)
     }
 }
 

@@ -81,6 +81,79 @@ fn time_steps() {
     }
 }
 
+/// A hexahedron with an array of `components` at each step: `values` of its lower and of its upper face.
+fn steps(times: &str, components: usize, values: &[[&str; 2]]) -> String {
+    let arrays = values.iter().enumerate().map(|(step, [low, high])| {
+        let s = [*low; 4].into_iter().chain([*high; 4]).collect::<Vec<_>>().join(" ");
+        format!(
+            "<DataArray type='Float64' Name='s' NumberOfComponents='{components}' TimeStep='{step}'>{s}</DataArray>"
+        )
+    });
+    let (before, rest) = ("<PointData>", "</PointData>");
+    let cube = cube(1.0, times);
+    let (head, tail) = (cube.split(before).next().unwrap_or_default(), cube.split(rest).nth(1).unwrap_or_default());
+    format!("{head}{before}{}{rest}{tail}", arrays.collect::<String>())
+}
+
+/// What is drawn of all time steps is what is drawn of each, where options leave nothing to choose.
+#[test]
+fn all_time_steps_with_options_of_the_look() {
+    let place = TempDir::new().unwrap();
+    let folder = place.path();
+    let picture = |name: &str| Image::open(&folder.join(name)).unwrap();
+    let check = |mesh: String, options: &str, alone: &str| {
+        std::fs::write(folder.join("a.vtu"), mesh).unwrap();
+        succeeds(folder, &format!("render a.vtu --out x.npy --size 32x24 --all-times {options}"));
+        let all: Vec<Image> = (0..3).map(|step| picture(&format!("x_000{step}.npy"))).collect();
+        for (step, image) in all.iter().enumerate() {
+            succeeds(folder, &format!("render a.vtu --out y.npy --size 32x24 --time {step} {options} {alone}"));
+            assert!(picture("y.npy") == *image, "step {step}: {options}");
+            assert!(image.pixels.iter().any(|p| p[3] > 0.2), "step {step} shows something: {options}");
+        }
+        assert!(all[0] != all[1] && all[1] != all[2], "{options}");
+    };
+    let times = "0 1 2";
+    let look = "--opacity 0%:1,100%:2 --unit-distance 0.5";
+    let positive = steps(times, 1, &[["1", "1000"], ["2", "2000"], ["3", "3000"]]);
+    check(positive.clone(), &format!("--log {look}"), "--range 1:3000");
+    check(positive, &format!("--log --nan-color 1,0,0 {look}"), "--range 1:3000");
+    let missing = steps(times, 1, &[["0", "4"], ["nan", "4"], ["1", "3"]]);
+    check(missing, &format!("--nan-color 0,1,0,0.5 {look}"), "--range 0:4");
+    let colors = steps(times, 4, &[["1 0 0 1", "0 1 0 2"], ["0 1 0 1", "0 0 1 2"], ["0 0 1 2", "1 0 0 1"]]);
+    check(colors, "--rgba s --opacity 0:0,2:2 --unit-distance 0.5", "");
+    let pairs = steps(times, 2, &[["1 1", "2 2"], ["2 1", "3 2"], ["3 2", "5 1"]]);
+    check(pairs, "--pair s --opacity 0:0,2:2 --unit-distance 0.5", "--range 1:5");
+    // Values of both signs are told apart by colour, as in one picture: around 0, as far as any step goes.
+    let signed = steps(times, 1, &[["-1", "1"], ["-2", "3"], ["-4", "1"]]);
+    check(signed, look, "--range -4:4 --colormap coolwarm");
+}
+
+/// The logarithm of a value that is 0 in the first step, as that of many simulations is, and of meshes without values.
+#[test]
+fn all_time_steps_of_nothing() {
+    let place = TempDir::new().unwrap();
+    let folder = place.path();
+    let picture = |name: &str| Image::open(&folder.join(name)).unwrap();
+    let zero = steps("0 1 2", 1, &[["0", "0"], ["0", "1"], ["0.5", "2"]]);
+    std::fs::write(folder.join("a.vtu"), zero).unwrap();
+    succeeds(folder, "render a.vtu --out x.npy --size 32x24 --all-times --log --opacity 0%:0,100%:1");
+    let opacities = ["x_0000.npy", "x_0001.npy", "x_0002.npy"]
+        .map(|name| picture(name).pixels.iter().map(|p| f64::from(p[3])).sum::<f64>());
+    assert!(opacities[0] == 0.0 && opacities[1] > 1.0 && opacities[2] > opacities[1], "{opacities:?}");
+    let bare = steps("0", 1, &[]);
+    let entry = |step: usize| format!("<DataSet timestep='{step}' file='b.vtu'/>");
+    let list = format!("<VTKFile type='Collection'><Collection>{}{}</Collection></VTKFile>", entry(0), entry(1));
+    std::fs::write(folder.join("b.vtu"), bare).unwrap();
+    std::fs::write(folder.join("b.pvd"), list).unwrap();
+    succeeds(folder, "render b.pvd --out x.npy --size 32x24 --all-times");
+    succeeds(folder, "render b.vtu --out y.npy --size 32x24");
+    assert!(picture("x_0000.npy") == picture("y.npy") && picture("x_0001.npy") == picture("y.npy"));
+    // One step is a time, too.
+    std::fs::write(folder.join("c.vtu"), cube(1.0, "2.5")).unwrap();
+    let told = succeeds(folder, "info c.vtu");
+    assert!(told.contains("time steps\n             0  2.5  described here\n"), "{told}");
+}
+
 #[test]
 fn standard_input_and_output() {
     let place = TempDir::new().unwrap();
@@ -121,7 +194,7 @@ fn case(name: &str) -> Option<PathBuf> {
     if path.exists() {
         return path.canonicalize().ok();
     }
-    eprintln!("skipped: no {}", path.display());
+    eprintln!("skipped in part: there is no {}", path.display());
     None
 }
 
@@ -161,5 +234,28 @@ fn cases_of_users() {
         let (code, out, err) = run(folder, &format!("info {}", path.display()), b"");
         assert!(code == Some(1) && out.is_empty() && err.lines().count() == 1, "{err}");
         assert!(err.contains("POINT_DATA has 26 tuples where there are 27 points"), "{err}");
+    }
+}
+
+/// What `examples/` shows draws pictures; cargo builds it with all tests.
+#[test]
+fn examples_draw() {
+    let built = std::env::current_exe().unwrap().ancestors().nth(2).unwrap().join("examples");
+    let place = TempDir::new().unwrap();
+    let folder = place.path();
+    std::fs::write(folder.join("a.vtu"), cube(1.0, "0")).unwrap();
+    for (name, arguments) in [("file_to_png", &["a.vtu", "a.png"][..]), ("mesh_from_arrays", &["b.png"])] {
+        let program = built.join(name);
+        if !program.exists() {
+            eprintln!("skipped in part: there is no {}", program.display());
+            continue;
+        }
+        let mut command = Command::new(program);
+        let output = command.current_dir(folder).args(arguments).env("HALITE_DEVICE", "cpu").output().unwrap();
+        assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
+        let picture = image::open(folder.join(arguments[arguments.len() - 1])).unwrap().into_rgb8();
+        let differ = picture.pixels().filter(|p| *p != picture.get_pixel(0, 0)).count();
+        assert!(differ > 10_000, "{name}: {differ} pixels show something");
+        assert!(!Command::new(built.join(name)).output().unwrap().status.success(), "{name} without arguments");
     }
 }

@@ -223,7 +223,7 @@ fn much_of_little_is_refused() {
         faces.concat()
     );
     refused(file.as_bytes(), 16 * file.len(), "a face has two sides");
-    // A tag that does not end in a file of 20 MB: it is given up after 1 MiB, twice as much while room for it grows.
+    // A tag that does not end in a file of 20 MB: it is given up after 256 KiB.
     let at = text.windows(8).position(|w| w == b"<Points>").unwrap();
     refused(&[&text[..at], b"<Points a=\"", &vec![b'x'; 20 << 20][..]].concat(), 4 << 20, "a tag has more than");
     // Sizes that nobody has, and that the file's own numbers agree on.
@@ -237,4 +237,84 @@ fn much_of_little_is_refused() {
     }
     let lie = lie("ASCII", "BINARY");
     refused(&lie, 1 << 20, "at byte");
+}
+
+/// Opens a file and splits its cells, as a program does that has only so much address space, and says how that went.
+#[cfg(target_os = "linux")]
+fn limited_child(path: &Path) {
+    // Threads take memory that nobody asks for.
+    rayon::ThreadPoolBuilder::new().num_threads(2).build_global().unwrap();
+    rayon::broadcast(|_| ());
+    let status = std::fs::read_to_string("/proc/self/status").unwrap();
+    let size = status.lines().find_map(|line| line.strip_prefix("VmSize:")).unwrap().trim();
+    eprintln!("SIZE: {}", size.strip_suffix(" kB").unwrap());
+    let split = halite::io::open(path, &|_| ()).and_then(|mesh| halite::mesh::cells::Tetrahedra::new(&mesh));
+    match split {
+        Ok(tetrahedra) => eprintln!("RESULT: {} tetrahedra", tetrahedra.corners.len()),
+        Err(halite::Error::NoMemory(why)) => eprintln!("RESULT: no memory: {why}"),
+        Err(error) => eprintln!("RESULT: another error: {error}"),
+    }
+}
+
+/// With little memory a file is read, or there is an error: the process goes on.
+#[cfg(target_os = "linux")]
+#[test]
+fn memory_that_is_not_there_is_an_error() {
+    const CHILD: &str = "HALITE_LIMITED_CHILD";
+    if let Some(path) = std::env::var_os(CHILD) {
+        limited_child(Path::new(&path));
+        return;
+    }
+    let _alone = ALONE.lock();
+    let folder = tempfile::tempdir().unwrap();
+    let run = |path: &Path, kilobytes: Option<u64>| {
+        let limit = kilobytes.map_or("unlimited".to_owned(), |kb| kb.to_string());
+        let output = std::process::Command::new("sh")
+            .args(["-c", "ulimit -v $0; exec \"$@\"", &limit])
+            .arg(std::env::current_exe().unwrap())
+            .args(["--exact", "memory_that_is_not_there_is_an_error", "--nocapture", "--test-threads=1"])
+            .envs([("MALLOC_ARENA_MAX", "1"), (CHILD, path.to_str().unwrap())])
+            .output()
+            .unwrap();
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success(), "{} in {limit} kB: {}, {told}", path.display(), output.status);
+        let after = |key: &str| told.lines().find_map(|line| line.strip_prefix(key)).map(str::to_owned);
+        (after("SIZE: ").unwrap(), after("RESULT: ").unwrap_or_else(|| panic!("{told}")))
+    };
+    let (own, bricks) = (lattice(34), generate::hexahedra(40));
+    let bricks = Piece {
+        points: Values::F32(bricks.points().iter().flat_map(|p| p.to_array().map(|x| x as f32)).collect()),
+        connectivity: Values::I64(bricks.cells().connectivity.iter().map(|p| i64::from(*p)).collect()),
+        offsets: Values::I64(bricks.cells().offsets[1..].iter().map(|o| *o as i64).collect()),
+        types: Values::U8(bricks.cells().types.clone()),
+        point_data: vec![array("s", 1, bricks.point_arrays()[0].values.clone())],
+        cell_data: vec![],
+    };
+    let raw = Style { mode: Mode::AppendedRaw, ..PLAIN };
+    let packed = |codec| Style { codec, block: Some(1 << 22), ..raw };
+    let files = [
+        ("raw.vtu", write(raw, std::slice::from_ref(&bricks))),
+        ("pieces.vtu", write(raw, &[lattice(20), lattice(20), own.clone()])),
+        ("text.vtu", write(Style { mode: Mode::Ascii, ..PLAIN }, std::slice::from_ref(&own))),
+        ("zlib.vtu", write(packed(Codec::ZLib), std::slice::from_ref(&own))),
+        ("lz4.vtu", write(packed(Codec::LZ4), std::slice::from_ref(&own))),
+        ("binary.vtk", legacy(34)),
+    ];
+    for (name, bytes) in files {
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        let (size, result) = run(&path, None);
+        assert!(result.ends_with(" tetrahedra"), "{name}: {result}");
+        let size: u64 = size.parse().unwrap();
+        let (mut refused, mut read) = (0, 0);
+        for megabytes in [4, 10, 16, 18, 22, 26, 32, 40, 55, 150] {
+            match run(&path, Some(size + megabytes * 1024)).1 {
+                told if told == result => read += 1,
+                told if told.starts_with("no memory: there is not enough memory for ") => refused += 1,
+                told => panic!("{name} with {megabytes} MB: {told}"),
+            }
+        }
+        eprintln!("{name}: with too little memory refused {refused} times, read {read} times");
+        assert!(refused > 1 && read > 0, "{name}");
+    }
 }

@@ -115,7 +115,8 @@ void check(const char* what, const void* data, std::size_t count, std::size_t si
   }
   if (reinterpret_cast<std::uintptr_t>(data) % size != 0)
   {
-    throw Error(std::string(what) + ": numbers of " + std::to_string(size) + " bytes at an address that is no multiple of that");
+    throw Error(
+      std::string(what) + ": numbers of " + std::to_string(size) + " bytes at an address that is no multiple of that");
   }
 }
 
@@ -141,7 +142,8 @@ std::size_t sizeOfImage(std::uint32_t width, std::uint32_t height)
   const std::size_t pixels = std::size_t(width) * height;
   if (pixels > static_cast<std::size_t>(PTRDIFF_MAX) / 16)
   {
-    throw Error("an image of " + std::to_string(width) + "x" + std::to_string(height) + " pixels is larger than memory");
+    throw Error(
+      "an image of " + std::to_string(width) + "x" + std::to_string(height) + " pixels is larger than memory");
   }
   return 4 * pixels;
 }
@@ -212,8 +214,10 @@ Mesh::~Mesh() = default;
 
 void Mesh::addPolyhedra(Numbers cells, Numbers faces, Numbers points)
 {
-  call([&] { bridge::add_polyhedra(Inner::Of(*this), numbers("starts of cells", cells), numbers("starts of faces", faces),
-      numbers("points of faces", points)); });
+  call([&] {
+    bridge::add_polyhedra(Inner::Of(*this), numbers("starts of cells", cells), numbers("starts of faces", faces),
+      numbers("points of faces", points));
+  });
 }
 
 void Mesh::addArray(const std::string& name, Association association, std::size_t components, Numbers n)
@@ -240,9 +244,8 @@ struct Grid::Inner
 
 Grid::Grid(Numbers x, Numbers y, Numbers z, const std::array<double, 3>& origin, const std::array<double, 9>& direction)
 {
-  this->Data.reset(new Inner{ call([&] {
-    return bridge::new_grid(numbers("x", x), numbers("y", y), numbers("z", z), origin, direction);
-  }) });
+  this->Data.reset(new Inner{
+    call([&] { return bridge::new_grid(numbers("x", x), numbers("y", y), numbers("z", z), origin, direction); }) });
 }
 
 Grid::Grid(Grid&&) noexcept = default;
@@ -315,7 +318,8 @@ struct Renderer::Inner
 
   Inner(rust::Box<bridge::Log> lines, const Settings& s)
     : Lines(std::move(lines))
-    , Box(call(*this->Lines, s.log, [&] { return bridge::new_session(s.threads, str(s.device), str(s.engine), *this->Lines); }))
+    , Box(call(*this->Lines, s.log,
+        [&] { return bridge::new_session(s.threads, str(s.device), str(s.engine), *this->Lines); }))
     , Sink(s.log)
   {
   }
@@ -405,9 +409,8 @@ bool Renderer::movePoints(Numbers points, const Matrix* matrix)
 
 bool Renderer::movePoints(const Mesh& mesh, const Matrix* matrix)
 {
-  return Inner::Run(this->Data, [&](bridge::Session& session) {
-    return bridge::move_mesh(session, Mesh::Inner::Of(mesh), orIdentity(matrix));
-  });
+  return Inner::Run(this->Data,
+    [&](bridge::Session& session) { return bridge::move_mesh(session, Mesh::Inner::Of(mesh), orIdentity(matrix)); });
 }
 
 void Renderer::setField(const Mesh& mesh, const std::string& name, int component)
@@ -429,8 +432,8 @@ void Renderer::setField(
   const std::string& name, Association association, std::size_t components, int component, Numbers n)
 {
   Inner::Run(this->Data, [&](bridge::Session& session) {
-    bridge::set_field(session, { str(name), association == Association::Cells, components, component },
-      numbers(name.c_str(), n));
+    bridge::set_field(
+      session, { str(name), association == Association::Cells, components, component }, numbers(name.c_str(), n));
   });
 }
 
@@ -455,8 +458,8 @@ void Renderer::setTransferFunction(const TransferFunction& function)
 void Renderer::setIntegral(const Integral& i)
 {
   Inner::Run(this->Data, [&](bridge::Session& session) {
-    bridge::set_integral(session,
-      { str(i.form), i.table, str(i.lengths), str(i.texels), i.degree, str(i.alpha), str(i.planes) });
+    bridge::set_integral(
+      session, { str(i.form), i.table, str(i.lengths), str(i.texels), i.degree, str(i.alpha), str(i.planes) });
   });
 }
 

@@ -33,7 +33,8 @@ int main(int argc, char** argv)
       throw halite::Error("the mesh has no such array");
     }
     auto values = mesh.arrayValues(found - arrays.begin());
-    values.erase(std::remove_if(values.begin(), values.end(), [](double v) { return !std::isfinite(v); }), values.end());
+    values.erase(
+      std::remove_if(values.begin(), values.end(), [](double v) { return !std::isfinite(v); }), values.end());
     if (values.empty())
     {
       throw halite::Error("the array holds no finite value");

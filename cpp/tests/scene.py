@@ -288,6 +288,18 @@ class Errors:
         return len(self.said)
 
 
+def messages(mapper, event="ErrorEvent"):
+    """What the mapper says is wrong, as it is said; with "WarningEvent", what it warns of."""
+    said = []
+
+    def note(_, __, text):
+        said.append(text)
+
+    note.CallDataType = vtkCommonCore.VTK_STRING
+    mapper.AddObserver(event, note)
+    return said
+
+
 def main(names):
     """Runs all functions called test_*; exits with 1 if one failed."""
     failed = 0

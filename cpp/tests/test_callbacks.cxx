@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 // What C++ programs may do to the core: throw from what it calls back, use it from there, hand it nothing, copy and move.
 // No call ends the program, and the next picture is right.
+#include "core.h"
 #include "expect.h"
-
-#include <halite.h>
 
 #include <algorithm>
 #include <cmath>
@@ -15,25 +14,6 @@
 namespace
 {
 
-template <class Work>
-std::string failure(Work work)
-{
-  try
-  {
-    work();
-  }
-  catch (const halite::Error& error)
-  {
-    return error.what();
-  }
-  return "";
-}
-
-bool has(const std::string& text, const char* word)
-{
-  return text.find(word) != std::string::npos;
-}
-
 const std::vector<float> Points{ 0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 0, 0, 1, 1, 0, 1, 1, 1, 1, 0, 1, 1 };
 const std::vector<std::int32_t> Offsets{ 0, 8 }, Ids{ 0, 1, 2, 3, 4, 5, 6, 7 };
 const std::vector<std::uint8_t> Types{ 12 };
@@ -42,17 +22,6 @@ const std::vector<double> Values{ 0, 0, 0, 0, 1, 1, 1, 1 };
 halite::Mesh cube()
 {
   return halite::Mesh(Points, Types, Offsets, Ids);
-}
-
-halite::View view(std::uint32_t size)
-{
-  halite::View v;
-  v.width = v.height = size;
-  v.camera.position = { 0.5, 0.5, 5 };
-  v.camera.focalPoint = { 0.5, 0.5, 0.5 };
-  v.camera.parallel = true;
-  v.camera.parallelScale = 0.4;
-  return v;
 }
 
 void fill(halite::Renderer& renderer)
@@ -69,13 +38,13 @@ void fill(halite::Renderer& renderer)
 bool isRight(halite::Renderer& renderer)
 {
   std::vector<float> pixels(4 * 16 * 16);
-  return renderer.render(view(16), pixels.data()) &&
+  return renderer.render(fromAbove(16), pixels.data()) &&
     std::all_of(pixels.begin(), pixels.end(), [](float p) { return std::abs(p - (1 - std::exp(-1.0))) < 1e-5; });
 }
 
 // Large enough to be told of.
 const std::uint32_t Large = 1200;
-std::vector<float> Pixels(4 * Large* Large);
+std::vector<float> Pixels(4 * Large * Large);
 
 }
 
@@ -87,7 +56,7 @@ int main()
 
   // Whatever the progress function throws.
   const auto thrown = [&](auto what) {
-    return failure([&] { renderer.render(view(Large), Pixels.data(), [&](double) -> bool { throw what; }); });
+    return failure([&] { renderer.render(fromAbove(Large), Pixels.data(), [&](double) -> bool { throw what; }); });
   };
   EXPECT(has(thrown(std::runtime_error("enough of this")), "enough of this"));
   for (const std::string& message : { thrown(42), thrown("text"), thrown(std::string("text")), thrown(nullptr) })
@@ -100,17 +69,17 @@ int main()
   // Whatever it does with the renderer: it is refused, with a word of its own, and harms nothing.
   std::vector<std::string> refused;
   bool done = false;
-  EXPECT(renderer.render(view(Large), Pixels.data(), [&](double) {
+  EXPECT(renderer.render(fromAbove(Large), Pixels.data(), [&](double) {
     if (!done)
     {
       done = true;
       const auto tetrahedra = renderer.statistics().tetrahedra;
       EXPECT(tetrahedra == 6);
       float pixel[4];
-      refused = { failure([&] { renderer.render(view(1), pixel); }), failure([&] { fill(renderer); }),
+      refused = { failure([&] { renderer.render(fromAbove(1), pixel); }), failure([&] { fill(renderer); }),
         failure([&] { renderer.movePoints(Points); }), failure([&] { renderer.setIntegral({ "volume" }); }),
         failure([&] { renderer.setTransferFunction({}); }) };
-      std::thread([&] { refused.push_back(failure([&] { renderer.render(view(1), pixel); })); }).join();
+      std::thread([&] { refused.push_back(failure([&] { renderer.render(fromAbove(1), pixel); })); }).join();
     }
     return true;
   }));
@@ -124,14 +93,14 @@ int main()
   // Even ends it, or puts another in its place.
   auto owned = std::make_unique<halite::Renderer>(halite::Settings{ 1, "cpu" });
   fill(*owned);
-  EXPECT(owned->render(view(Large), Pixels.data(), [&](double) {
+  EXPECT(owned->render(fromAbove(Large), Pixels.data(), [&](double) {
     owned.reset();
     return true;
   }));
   EXPECT(std::abs(Pixels[4 * 600 * 1200 + 4 * 600] - (1 - std::exp(-1.0))) < 1e-5);
   halite::Renderer replaced({ 1, "cpu" });
   fill(replaced);
-  EXPECT(replaced.render(view(Large), Pixels.data(), [&](double) {
+  EXPECT(replaced.render(fromAbove(Large), Pixels.data(), [&](double) {
     replaced = halite::Renderer({ 1, "cpu" });
     return true;
   }));
@@ -147,20 +116,27 @@ int main()
   EXPECT(has(mesh(Points, { nullptr, 1, Type::UInt8 }, Offsets, Ids), "cell types"));
   EXPECT(has(mesh(Points, Types, { nullptr, 2, Type::Int32 }, Ids), "offsets"));
   EXPECT(has(mesh(Points, Types, Offsets, { nullptr, 8, Type::Int64 }), "connectivity"));
-  EXPECT(has(mesh({ Points.data(), std::numeric_limits<std::size_t>::max(), Type::Float32 }, Types, Offsets, Ids), "memory"));
+  EXPECT(has(
+    mesh({ Points.data(), std::numeric_limits<std::size_t>::max(), Type::Float32 }, Types, Offsets, Ids), "memory"));
   const auto* bytes = reinterpret_cast<const char*>(Points.data());
   EXPECT(has(mesh({ bytes + 1, 23, Type::Float32 }, Types, Offsets, Ids), "multiple"));
   EXPECT(has(mesh({ Points.data(), 24, static_cast<Type>(77) }, Types, Offsets, Ids), "77"));
   EXPECT(has(mesh({ Points.data(), 23, Type::Float32 }, Types, Offsets, Ids), "23 numbers"));
   halite::Mesh own = cube();
-  EXPECT(has(failure([&] { own.addArray("s", halite::Association::Points, 1, { nullptr, 8, Type::Float64 }); }), "null"));
+  EXPECT(has(failure([&] {
+    own.addArray("s", halite::Association::Points, 1, { nullptr, 8, Type::Float64 });
+  }),
+    "null"));
   EXPECT(has(failure([&] { own.addPolyhedra({ nullptr, 2, Type::Int32 }, Offsets, Ids); }), "null"));
-  EXPECT(has(failure([&] { renderer.setField("s", halite::Association::Points, 1, 0, { nullptr, 8, Type::Int8 }); }), "null"));
+  EXPECT(has(failure([&] {
+    renderer.setField("s", halite::Association::Points, 1, 0, { nullptr, 8, Type::Int8 });
+  }),
+    "null"));
   EXPECT(has(failure([&] { renderer.movePoints({ nullptr, 24, Type::Float64 }); }), "null"));
-  EXPECT(has(failure([&] { renderer.render(view(16), nullptr); }), "pixels"));
+  EXPECT(has(failure([&] { renderer.render(fromAbove(16), nullptr); }), "pixels"));
   EXPECT(has(failure([] { halite::saveImage("nothing.png", 4, 4, nullptr); }), "pixels"));
   const std::uint32_t most = std::numeric_limits<std::uint32_t>::max();
-  halite::View vast = view(16);
+  halite::View vast = fromAbove(16);
   vast.width = vast.height = most;
   EXPECT(has(failure([&] { renderer.render(vast, Pixels.data()); }), "larger than memory"));
   EXPECT(has(failure([&] { halite::saveImage("nothing.png", most, most, Pixels.data()); }), "larger than memory"));
@@ -171,7 +147,7 @@ int main()
   // What was moved away says so.
   halite::Renderer taken = std::move(renderer);
   EXPECT(isRight(taken));
-  EXPECT(has(failure([&] { renderer.render(view(1), Pixels.data()); }), "moved"));
+  EXPECT(has(failure([&] { renderer.render(fromAbove(1), Pixels.data()); }), "moved"));
   EXPECT(has(failure([&] { renderer.statistics(); }), "moved"));
   halite::Mesh there = std::move(own);
   EXPECT(has(failure([&] { own.points(); }), "moved"));
@@ -197,15 +173,15 @@ int main()
   }
   halite::Renderer first(settings[0]), second(settings[1]);
   user = &first;
-  const halite::Mesh surface(Points, std::vector<std::uint8_t>{ 9 }, std::vector<std::int32_t>{ 0, 4 },
-    std::vector<std::int32_t>{ 0, 1, 2, 3 });
+  const halite::Mesh surface(
+    Points, std::vector<std::uint8_t>{ 9 }, std::vector<std::int32_t>{ 0, 4 }, std::vector<std::int32_t>{ 0, 1, 2, 3 });
   first.setMesh(surface);
   EXPECT(!lines[0].empty() && has(lines[0][0], "nothing is drawn") && lines[1].empty());
   user = nullptr;
   fill(second);
   EXPECT(isRight(second) && lines[1].empty());
   std::vector<float> pixels(4);
-  EXPECT(first.render(view(1), pixels.data()) && pixels[3] == 0);
+  EXPECT(first.render(fromAbove(1), pixels.data()) && pixels[3] == 0);
 
   // Points that are not finite leave out their cells, under a matrix too; and come back when they are.
   std::vector<float> broken = Points;

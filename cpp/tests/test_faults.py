@@ -7,7 +7,6 @@ import sys
 import numpy as np
 from scene import *  # noqa: F403
 from test_pictures import RAMP, SLANT, WAVES
-from test_tables import messages
 from vtkmodules import vtkRenderingOpenGL2, vtkRenderingVolumeOpenGL2
 from vtkmodules.vtkImagingCore import vtkRTAnalyticSource
 
@@ -16,17 +15,6 @@ BOX = dict(field=SLANT, opacity=WAVES, color=RAMP)
 
 def box(**settings):
     return volume(lattice(2, field=SLANT), WAVES, RAMP, **settings)
-
-
-def warnings(mapper):
-    said = []
-
-    def note(_, __, text):
-        said.append(text)
-
-    note.CallDataType = vtkCommonCore.VTK_STRING
-    mapper.AddObserver("WarningEvent", note)
-    return said
 
 
 def test_a_window_that_cannot_is_forgotten():
@@ -162,7 +150,7 @@ def test_other_blend_modes_are_said_and_drawn_as_composite():
     for mode in (2, 3, 4, 5):
         v = box()
         v.GetMapper().SetBlendMode(mode)
-        said = warnings(v.GetMapper())
+        said = messages(v.GetMapper(), "WarningEvent")
         w, r = scene(v)
         check(pixels(w), expected, near=0)
         pixels(w)
@@ -190,7 +178,7 @@ def test_what_holds_is_said_once():
     for kind, most in (("none", 0), ("point", 1), ("ghost", 1), ("surface", 1), ("short", 1)):
         v = volume(step(kind, 0), WAVES, RAMP)
         m = v.GetMapper()
-        said, errors = warnings(m), messages(m)
+        said, errors = messages(m, "WarningEvent"), messages(m)
         w, r = scene(v, clip=(0.5, 12))
         for i in range(12):
             m.SetInputData(step(kind, i))
@@ -206,7 +194,7 @@ def test_what_holds_is_said_once():
 
 def test_warnings_are_those_of_the_mapper_that_they_are_about():
     a, b = volume(step("point", 0), WAVES, RAMP), box()
-    said = [warnings(v.GetMapper()) for v in (a, b)]
+    said = [messages(v.GetMapper(), "WarningEvent") for v in (a, b)]
     w, r = scene(a, b, clip=(0.5, 12))
     w.Render()
     assert len(said[0]) == 1 and "not finite" in said[0][0] and not said[1], said

@@ -106,6 +106,25 @@ def finalize_other(s):
     s.windows[1].Finalize()
 
 
+def remove_renderer(s):
+    s.windows[0].RemoveRenderer(s.renderers[0])
+
+
+def move_renderer(s):
+    """Into the other window, and back when the frame is over."""
+    remove_renderer(s)
+    s.windows[1].AddRenderer(s.renderers[0])
+
+
+def put_back(s):
+    for w, r in zip(s.windows, s.renderers):
+        for other in s.windows:
+            if other is not w:
+                other.RemoveRenderer(r)
+        if not w.HasRenderer(r):
+            w.AddRenderer(r)
+
+
 def resize(s):
     s.windows[0].SetSize(200, 150)
 
@@ -149,14 +168,24 @@ def abort(s):
 
 
 ACTIONS = (render_other, render_self, direct, release, release_both, remove, finalize, finalize_after_other, finalize_other, resize,
-           another_mapper, new_input, edit_data, edit_function, settings, ask, raise_an_error, abort)
+           remove_renderer, move_renderer, another_mapper, new_input, edit_data, edit_function, settings, ask, raise_an_error, abort)
 
 
 def test_actions_in_a_frame():
     for act in ACTIONS:
         s = Stage()
         s.observe(act)
+        put_back(s)
         s.check(act.__name__)
+
+
+def test_a_renderer_stays_where_observers_put_it():
+    s = Stage()
+    s.observe(remove_renderer)
+    assert not s.windows[0].HasRenderer(s.renderers[0]) and s.renderers[0].GetRenderWindow() is None
+    s = Stage()
+    s.observe(move_renderer)
+    assert not s.windows[0].HasRenderer(s.renderers[0]) and s.renderers[0].GetRenderWindow() is s.windows[1]
 
 
 def test_actions_when_another_window_is_known():
@@ -170,28 +199,24 @@ def test_actions_when_another_window_is_known():
 
 
 def test_actions_in_abort_checks():
-    # VTK's mapper of surfaces asks too, and does not survive another window.
-    for act in (render_other, release, finalize, remove):
-        s = Stage(walls=False)
-        s.observe(act, "AbortCheckEvent", s.windows[0])
-        s.windows[0].RemoveObservers("AbortCheckEvent")
-        s.check(act.__name__)
+    # VTK's mapper of surfaces asks too, and does not survive that its window is finalized.
+    for act in (render_other, release, finalize, remove, remove_renderer):
+        for walls in (False, True) if act in (render_other, release, remove) else (False,):
+            s = Stage(walls)
+            s.observe(act, "AbortCheckEvent", s.windows[0])
+            s.windows[0].RemoveObservers("AbortCheckEvent")
+            put_back(s)
+            s.check(f"{act.__name__}, walls {walls}")
 
 
 def test_a_frame_in_a_frame_is_refused_in_its_own_words():
     s = Stage()
-    said = []
-
-    def note(_, __, text):
-        said.append(text)
-
-    note.CallDataType = vtkCommonCore.VTK_STRING
-    s.mapper.AddObserver("WarningEvent", note)
-    s.mapper.AddObserver("ErrorEvent", note)
+    warnings, errors = messages(s.mapper, "WarningEvent"), messages(s.mapper)
     for _ in range(2):
         s.calls = 0
         s.observe(render_other)
         s.renderers[0].GetActiveCamera().Azimuth(5)
+    said = warnings + errors
     assert len(said) == 1 and "drawing a frame" in said[0] and "failed" not in said[0], said
 
 
@@ -236,8 +261,7 @@ def test_other_props_go_in_a_frame():
 
 
 def test_depth_peeling_is_survived_too():
-    # VTK's pass does not survive that its window is finalized.
-    for act in (release, new_input, edit_function, remove, render_other):
+    for act in ACTIONS:
         s = Stage()
         sheet = plane(0.4, (0.9, 0.3, 0.1))
         sheet.GetProperty().SetOpacity(0.5)
@@ -246,6 +270,7 @@ def test_depth_peeling_is_survived_too():
         r.UseDepthPeelingOn()
         r.UseDepthPeelingForVolumesOn()
         s.observe(act)
+        put_back(s)
         r.RemoveViewProp(sheet)
         s.check(act.__name__ + " while peeling")
 

@@ -68,18 +68,6 @@ def test_planes_of_cylinders():
     assert two < one
 
 
-def messages(mapper):
-    """What the mapper says is wrong, as it is said."""
-    said = []
-
-    def note(_, __, text):
-        said.append(text)
-
-    note.CallDataType = vtkCommonCore.VTK_STRING
-    mapper.AddObserver("ErrorEvent", note)
-    return said
-
-
 def test_bad_settings_are_one_error_and_can_be_mended():
     v, w, r = table()
     m = v.GetMapper()

@@ -34,8 +34,8 @@ struct Content
 
   // What a volume shows of a grid by `array`, of which `cellFlag` says what vtkAbstractMapper::GetScalars does. Throws
   // if there is no array, or VTK has no meaning for it.
-  Content(const halite::Settings& settings, vtkDataSet* grid, vtkDataArray* array, int cellFlag,
-    vtkVolume* volume, halite::OpacityConvention convention, Functions::Cache& functions);
+  Content(const halite::Settings& settings, vtkDataSet* grid, vtkDataArray* array, int cellFlag, vtkVolume* volume,
+    halite::OpacityConvention convention, Functions::Cache& functions);
 
   // What a picture depends on, but for the view.
   Key Whole() const;

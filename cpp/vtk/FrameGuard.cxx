@@ -3,11 +3,16 @@
 
 #include "vtkAbstractVolumeMapper.h"
 #include "vtkCollection.h"
+#include "vtkOpenGLRenderWindow.h"
+#include "vtkOpenGLShaderCache.h"
+#include "vtkOpenGLState.h"
 #include "vtkPropCollection.h"
 #include "vtkRenderer.h"
+#include "vtkRendererCollection.h"
 #include "vtkVolume.h"
 #include "vtkWindow.h"
 
+#include <limits>
 #include <map>
 #include <mutex>
 
@@ -25,6 +30,29 @@ Registry& Windows()
   static Registry* const all = new Registry;
   return *all;
 }
+
+// The priority of an observer that comes after all others.
+const float Last = std::numeric_limits<float>::lowest();
+
+// Programs that make contexts by themselves know best.
+bool IsCurrent(vtkOpenGLRenderWindow* window)
+{
+  return window->IsA("vtkGenericOpenGLRenderWindow") || window->IsCurrent();
+}
+
+struct ContextKeeper : vtkCommand
+{
+  static ContextKeeper* New() { return new ContextKeeper; }
+
+  void Execute(vtkObject* caller, unsigned long, void*) override
+  {
+    vtkOpenGLRenderWindow* window = vtkOpenGLRenderWindow::SafeDownCast(caller);
+    if (window && window->CheckInRenderStatus() && !IsCurrent(window))
+    {
+      window->MakeCurrent();
+    }
+  }
+};
 
 }
 
@@ -60,9 +88,11 @@ FrameGuard& FrameGuard::Of(vtkWindow* window)
 }
 
 void FrameGuard::Keep(
-  vtkWindow* window, vtkRenderer* renderer, vtkVolume* volume, vtkAbstractVolumeMapper* mapper)
+  vtkOpenGLRenderWindow* window, vtkRenderer* renderer, vtkVolume* volume, vtkAbstractVolumeMapper* mapper)
 {
-  auto& objects = Of(window).Objects;
+  FrameGuard& guard = Of(window);
+  guard.State = guard.State ? guard.State.Get() : window->GetState();
+  auto& objects = guard.Objects;
   objects.insert({ renderer, volume, mapper });
   vtkPropCollection* props = renderer->GetViewProps();
   vtkCollectionSimpleIterator at;
@@ -81,7 +111,33 @@ void FrameGuard::GiveBack(vtkWindow* window, vtkVolume* volume, vtkAbstractVolum
   }
 }
 
-void FrameGuard::Execute(vtkObject* window, unsigned long, void*)
+void FrameGuard::GiveBack(vtkRenderWindow* window, vtkRenderer* renderer)
+{
+  if (renderer->GetRenderWindow() != window)
+  {
+    FrameGuard& guard = Of(window);
+    guard.Objects.insert(renderer);
+    guard.Moved[renderer] = renderer->GetRenderWindow();
+    renderer->SetRenderWindow(window);
+  }
+}
+
+void FrameGuard::KeepContext(vtkOpenGLRenderWindow* window)
+{
+  // Never destroyed, as windows may outlive what is static here.
+  static ContextKeeper* const keeper = ContextKeeper::New();
+  if (!window->HasObserver(vtkCommand::AbortCheckEvent, keeper))
+  {
+    window->AddObserver(vtkCommand::AbortCheckEvent, keeper, Last);
+  }
+  // In this frame it may be too late: what VTK keeps of surfaces is in another context then, and goes when the frame is over.
+  if (window->CheckInRenderStatus() && !IsCurrent(window))
+  {
+    Of(window).IsAstray = true;
+  }
+}
+
+void FrameGuard::Execute(vtkObject* caller, unsigned long, void*)
 {
   {
     Registry& all = Windows();
@@ -98,5 +154,28 @@ void FrameGuard::Execute(vtkObject* window, unsigned long, void*)
       volume->SetMapper(nullptr);
     }
   }
-  window->RemoveObserver(this->Observer);
+  vtkOpenGLRenderWindow* window = vtkOpenGLRenderWindow::SafeDownCast(caller);
+  // VTK has gone on with what it knew of another context.
+  if (this->State && window->GetState() != this->State && IsCurrent(window))
+  {
+    window->GetState()->Reset();
+  }
+  if (this->IsAstray)
+  {
+    window->GetShaderCache()->ReleaseGraphicsResources(window);
+    vtkRendererCollection* renderers = window->GetRenderers();
+    vtkCollectionSimpleIterator at;
+    for (renderers->InitTraversal(at); vtkRenderer* renderer = renderers->GetNextRenderer(at);)
+    {
+      renderer->ReleaseGraphicsResources(window);
+    }
+  }
+  for (const auto& moved : this->Moved)
+  {
+    if (moved.first->GetRenderWindow() == window && !window->HasRenderer(moved.first))
+    {
+      moved.first->SetRenderWindow(moved.second);
+    }
+  }
+  caller->RemoveObserver(this->Observer);
 }

@@ -9,10 +9,10 @@ namespace
 // What lies between two ends of a ray, by the pixels up to both.
 void Between(const float* near, const float* far, float* pixel)
 {
-  const double through = 1.0 - near[3];
+  const double transmittance = 1.0 - near[3];
   for (int k = 0; k < 4; ++k)
   {
-    pixel[k] = through > 0 ? static_cast<float>(std::max((double(far[k]) - near[k]) / through, 0.0)) : 0;
+    pixel[k] = transmittance > 0 ? static_cast<float>(std::max((double(far[k]) - near[k]) / transmittance, 0.0)) : 0;
   }
   pixel[3] = std::min(pixel[3], 1.0f);
 }
@@ -39,17 +39,17 @@ const float* Layers::Find(std::size_t pixel, float depth)
   return nullptr;
 }
 
-bool Layers::Complete(const std::vector<Parts>& parts, const Draw& draw)
+bool Layers::Complete(const std::vector<Intervals>& intervals, const Draw& draw)
 {
-  for (float Part::*end : { &Part::Start, &Part::End })
+  for (float Interval::*end : { &Interval::Start, &Interval::End })
   {
-    for (Part Parts::*part : { &Parts::Front, &Parts::Back })
+    for (Interval Intervals::*interval : { &Intervals::Front, &Intervals::Back })
     {
-      std::vector<float> ends(parts.size(), 0.0f);
+      std::vector<float> ends(intervals.size(), 0.0f);
       bool any = false;
-      for (std::size_t i = 0; i < parts.size(); ++i)
+      for (std::size_t i = 0; i < intervals.size(); ++i)
       {
-        const Part& p = parts[i].*part;
+        const Interval& p = intervals[i].*interval;
         if (p.Start < p.End && !this->Find(i, p.*end))
         {
           ends[i] = p.*end;
@@ -80,12 +80,12 @@ bool Layers::Complete(const std::vector<Parts>& parts, const Draw& draw)
   return true;
 }
 
-std::vector<float> Layers::PictureOf(const std::vector<Parts>& parts, Part Parts::*part)
+std::vector<float> Layers::PictureOf(const std::vector<Intervals>& intervals, Interval Intervals::*interval)
 {
-  std::vector<float> pixels(4 * parts.size(), 0.0f);
-  for (std::size_t i = 0; i < parts.size(); ++i)
+  std::vector<float> pixels(4 * intervals.size(), 0.0f);
+  for (std::size_t i = 0; i < intervals.size(); ++i)
   {
-    const Part& p = parts[i].*part;
+    const Interval& p = intervals[i].*interval;
     if (p.Start < p.End)
     {
       Between(this->Find(i, p.Start), this->Find(i, p.End), &pixels[4 * i]);

@@ -15,10 +15,10 @@ public:
   using Draw = std::function<bool(const std::vector<float>& ends, std::vector<float>& pixels)>;
 
   // Has all that these parts are made of; asks for what is not there yet. False if that was given up.
-  bool Complete(const std::vector<Parts>& parts, const Draw& draw);
+  bool Complete(const std::vector<Intervals>& intervals, const Draw& draw);
 
   // One part of each pixel, premultiplied; of parts that are complete.
-  std::vector<float> PictureOf(const std::vector<Parts>& parts, Part Parts::*part);
+  std::vector<float> PictureOf(const std::vector<Intervals>& intervals, Interval Intervals::*interval);
 
   // Forgets what was not used since this was called last.
   void DropUnused();

@@ -87,11 +87,9 @@ const void* ComponentOf(vtkDataArray* array, int component)
 {
   switch (array->GetDataType())
   {
-    vtkTemplateMacro(
-      if (auto soa = vtkSOADataArrayTemplate<VTK_TT>::FastDownCast(array))
-      {
-        return soa->GetComponentArrayPointer(component);
-      });
+    vtkTemplateMacro(if (auto soa = vtkSOADataArrayTemplate<VTK_TT>::FastDownCast(array)) {
+      return soa->GetComponentArrayPointer(component);
+    });
     default:
       break;
   }
@@ -128,8 +126,8 @@ halite::Numbers MeshView::Numbers(vtkDataArray* array, int component)
       return { data, tuples, type };
     }
   }
-  auto copy = vtkSmartPointer<vtkDataArray>::Take(
-    vtkDataArray::CreateDataArray(known ? array->GetDataType() : VTK_DOUBLE));
+  auto copy =
+    vtkSmartPointer<vtkDataArray>::Take(vtkDataArray::CreateDataArray(known ? array->GetDataType() : VTK_DOUBLE));
   if (component >= 0 && components > 1)
   {
     copy->SetNumberOfTuples(array->GetNumberOfTuples());
@@ -235,7 +233,8 @@ halite::Mesh MeshView::Mesh(vtkDataSet* base)
   }
   halite::Mesh mesh(this->Points(base), types, offsets, connectivity);
   auto grid = vtkUnstructuredGrid::SafeDownCast(base);
-  if (grid && types.type == halite::Type::UInt8 && types.count > 0 && std::memchr(types.data, VTK_POLYHEDRON, types.count))
+  if (grid && types.type == halite::Type::UInt8 && types.count > 0 &&
+    std::memchr(types.data, VTK_POLYHEDRON, types.count))
   {
     const Faces faces(grid);
     this->Copies += 3;
@@ -339,7 +338,8 @@ std::vector<std::uint64_t> MeshView::Identity(vtkDataSet* base)
   }
   vtkCellArray* cells = grid->GetCells();
   vtkPoints* points = grid->GetPoints();
-  return { Time(points), Time(points ? points->GetData() : nullptr), Time(cells), Time(vtkHaliteCompatibility::GetCellTypes(grid)),
-    Time(Ghosts(grid->GetPointData())), Time(Ghosts(grid->GetCellData())),
-    static_cast<std::uint64_t>(grid->GetNumberOfPoints()), static_cast<std::uint64_t>(grid->GetNumberOfCells()) };
+  return { Time(points), Time(points ? points->GetData() : nullptr), Time(cells),
+    Time(vtkHaliteCompatibility::GetCellTypes(grid)), Time(Ghosts(grid->GetPointData())),
+    Time(Ghosts(grid->GetCellData())), static_cast<std::uint64_t>(grid->GetNumberOfPoints()),
+    static_cast<std::uint64_t>(grid->GetNumberOfCells()) };
 }

@@ -15,10 +15,14 @@
 #include "vtkOpenGLShaderCache.h"
 #include "vtkOpenGLState.h"
 #include "vtkPixelBufferObject.h"
+#include "vtkRenderState.h"
+#include "vtkRenderer.h"
 #include "vtkShaderProgram.h"
 #include "vtkTextureObject.h"
 #include "vtkVolume.h"
 
+#include <algorithm>
+#include <iterator>
 #include <stdexcept>
 #include <string>
 
@@ -26,7 +30,7 @@ namespace
 {
 
 // An outer depth is a layer that was peeled, an inner one the next; in front they are negative, and -1 is none.
-const char* const Questions[] = {
+const char* const IntervalShaders[] = {
   "//VTK::System::Dec\n"
   "//VTK::Output::Dec\n"
   "in vec2 texCoord;\n"
@@ -47,9 +51,9 @@ const char* const Questions[] = {
   "  float opaque = texture(opaqueDepthTex, texCoord).x;\n"
   "  bool none = next.x == -1.0;\n"
   "  float end = none ? last.y : -next.x;\n"
-  "  vec4 parts = vec4(-last.x, min(end, opaque), 0.0, 0.0);\n"
-  "  if (!none && end < opaque) { parts.zw = vec2(next.y, last.y); }\n"
-  "  gl_FragData[0] = last.x == -1.0 ? vec4(0.0) : parts;\n"
+  "  vec4 intervals = vec4(-last.x, min(end, opaque), 0.0, 0.0);\n"
+  "  if (!none && end < opaque) { intervals.zw = vec2(next.y, last.y); }\n"
+  "  gl_FragData[0] = last.x == -1.0 ? vec4(0.0) : intervals;\n"
   "}\n",
   "//VTK::System::Dec\n"
   "//VTK::Output::Dec\n"
@@ -65,7 +69,7 @@ const char* const Questions[] = {
 // targets start empty, in front of the layers with what was peeled before. What lies before all layers may be kept until the
 // first layer was drawn: VTK's layers have 8 bits, and what is written less often is rounded less often. Then the volume
 // must be alone, as it takes the place of all that was there.
-const char* const Answers[] = {
+const char* const CompositeShaders[] = {
   "//VTK::System::Dec\n"
   "//VTK::Output::Dec\n"
   "in vec2 texCoord;\n"
@@ -94,6 +98,42 @@ const char* const Answers[] = {
   "void main() { gl_FragData[0] = texture(back, texCoord); }\n",
 };
 
+// What only classes derived from the pass may see of it, and it offers nobody else.
+struct OpenedPass : vtkDualDepthPeelingPass
+{
+  static void Restore(vtkDualDepthPeelingPass* pass)
+  {
+    const vtkRenderState* state = pass->*&OpenedPass::RenderState;
+    if (!state)
+    {
+      return;
+    }
+    auto window = static_cast<vtkOpenGLRenderWindow*>(state->GetRenderer()->GetRenderWindow());
+    vtkOpenGLState*& known = pass->*&OpenedPass::State;
+    if (known != window->GetState())
+    {
+      known = window->GetState();
+      (pass->*&OpenedPass::InitFramebuffer)(state);
+      (pass->*&OpenedPass::Framebuffer)->Bind(OpenGL::DrawFramebuffer);
+    }
+    auto& textures = pass->*&OpenedPass::Textures;
+    if (textures[Back])
+    {
+      return;
+    }
+    std::generate(std::begin(textures), std::end(textures), &vtkTextureObject::New);
+    for (TextureName color : { BackTemp, Back, FrontA, FrontB })
+    {
+      (pass->*&OpenedPass::InitColorTexture)(textures[color], state);
+    }
+    for (TextureName depth : { DepthA, DepthB })
+    {
+      (pass->*&OpenedPass::InitDepthTexture)(textures[depth], state);
+    }
+    (pass->*&OpenedPass::InitOpaqueDepthTexture)(textures[OpaqueDepth], state);
+  }
+};
+
 }
 
 Peeling::Peeling(vtkOpenGLRenderWindow* window)
@@ -115,6 +155,14 @@ vtkOpenGLRenderPass* Peeling::PassOf(vtkAbstractMapper* mapper, vtkVolume* volum
     }
   }
   return nullptr;
+}
+
+void Peeling::Restore(vtkOpenGLRenderPass* pass)
+{
+  if (auto dual = vtkDualDepthPeelingPass::SafeDownCast(pass))
+  {
+    OpenedPass::Restore(dual);
+  }
 }
 
 Peeling::Stage Peeling::StageOf(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolume* volume)
@@ -146,8 +194,8 @@ vtkOpenGLQuadHelper& Peeling::Ready(std::unique_ptr<vtkOpenGLQuadHelper>& quad, 
   return *quad;
 }
 
-void Peeling::Ask(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolume* volume, int width, int height,
-  std::vector<Parts>& parts)
+void Peeling::ReadIntervals(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolume* volume, int width,
+  int height, std::vector<Intervals>& intervals)
 {
   this->Now = StageOf(pass, mapper, volume);
   vtkOpenGLState* state = this->Window->GetState();
@@ -170,7 +218,7 @@ void Peeling::Ask(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolum
   {
     throw std::runtime_error("the window refuses a texture of 32-bit floats");
   }
-  vtkOpenGLQuadHelper& quad = this->Ready(this->Questions[this->Now], ::Questions[this->Now]);
+  vtkOpenGLQuadHelper& quad = this->Ready(this->IntervalShaders[this->Now], ::IntervalShaders[this->Now]);
   state->PushFramebufferBindings();
   buffer->Bind();
   buffer->AddColorAttachment(0, depths);
@@ -180,12 +228,12 @@ void Peeling::Ask(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolum
   buffer->RemoveColorAttachment(0);
   state->PopFramebufferBindings();
 
-  static_assert(sizeof(Parts) == 4 * sizeof(float), "four depths are read at once");
-  parts.resize(static_cast<std::size_t>(width) * height);
+  static_assert(sizeof(Intervals) == 4 * sizeof(float), "four depths are read at once");
+  intervals.resize(static_cast<std::size_t>(width) * height);
   auto packed = vtkSmartPointer<vtkPixelBufferObject>::Take(depths->Download());
   unsigned int size[2] = { static_cast<unsigned int>(width), static_cast<unsigned int>(height) };
   vtkIdType steps[2] = { 0, 0 };
-  const bool read = packed && packed->Download2D(VTK_FLOAT, parts.data(), size, 4, steps);
+  const bool read = packed && packed->Download2D(VTK_FLOAT, intervals.data(), size, 4, steps);
   buffer->ReleaseGraphicsResources(this->Window);
   if (!read)
   {
@@ -193,7 +241,7 @@ void Peeling::Ask(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolum
   }
 }
 
-void Peeling::Answer(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolume* volume, bool isAlone,
+void Peeling::Composite(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolume* volume, bool isAlone,
   vtkTextureObject* kept, vtkTextureObject* front, vtkTextureObject* back)
 {
   vtkOpenGLState* state = this->Window->GetState();
@@ -208,7 +256,7 @@ void Peeling::Answer(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVo
   state->vtkglBlendFuncSeparate(OpenGL::One, OpenGL::OneMinusSourceAlpha, OpenGL::One, OpenGL::OneMinusSourceAlpha);
   state->vtkglBlendEquation(OpenGL::Add);
 
-  vtkOpenGLQuadHelper& quad = this->Ready(this->Answers[this->Now], ::Answers[this->Now]);
+  vtkOpenGLQuadHelper& quad = this->Ready(this->CompositeShaders[this->Now], ::CompositeShaders[this->Now]);
   pass->SetShaderParameters(quad.Program, mapper, volume);
   vtkTextureObject* const textures[] = { kept, front, back };
   const char* const names[] = { "kept", "front", "back" };

@@ -21,16 +21,16 @@ class vtkVolume;
 VTK_ABI_NAMESPACE_END
 
 // Window depths between which a part of a pixel's ray lies: nothing of it if they do not grow.
-struct Part
+struct Interval
 {
   float Start, End;
 };
 
 // The two parts of a ray that one peel draws: that behind the layer which was peeled from the front, and that before
 // the one which was peeled from behind.
-struct Parts
+struct Intervals
 {
-  Part Front, Back;
+  Interval Front, Back;
 };
 
 // What one window keeps to draw parts of rays.
@@ -43,16 +43,21 @@ public:
   // The pass that draws a volume in peels just now; null if none does, or in a way that is not known.
   static vtkOpenGLRenderPass* PassOf(vtkAbstractMapper* mapper, vtkVolume* volume);
 
+  // Gives the pass textures again if it has released its own, and the OpenGL state of the window's new context if that was
+  // finalized: it releases them whenever its window or renderer is told to, but does not survive it in the middle of a
+  // frame. What was peeled is lost, as the window's picture is.
+  static void Restore(vtkOpenGLRenderPass* pass);
+
   // What the pass wants of each pixel, row 0 lowest.
-  void Ask(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolume* volume, int width, int height,
-    std::vector<Parts>& parts);
+  void ReadIntervals(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolume* volume, int width, int height,
+    std::vector<Intervals>& intervals);
 
   // Whether what was asked for last lies before and behind all layers; it starts a frame.
   bool IsOutside() const { return this->Now == Outside; }
 
   // Gives it the pictures of these parts, premultiplied. What was kept goes before all layers that were drawn until now; that
   // is only for a volume that is alone in the scene.
-  void Answer(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolume* volume, bool isAlone,
+  void Composite(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vtkVolume* volume, bool isAlone,
     vtkTextureObject* kept, vtkTextureObject* front, vtkTextureObject* back);
 
 private:
@@ -69,5 +74,5 @@ private:
 
   vtkWeakPointer<vtkOpenGLRenderWindow> Window;
   Stage Now = Unknown;
-  std::array<std::unique_ptr<vtkOpenGLQuadHelper>, 3> Questions, Answers;
+  std::array<std::unique_ptr<vtkOpenGLQuadHelper>, 3> IntervalShaders, CompositeShaders;
 };

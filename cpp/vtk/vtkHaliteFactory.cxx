@@ -36,7 +36,10 @@ public:
   vtkTypeMacro(vtkHaliteFactory, vtkObjectFactory);
 
   const char* GetVTKSourceVersion() VTK_FUTURE_CONST override { return VTK_SOURCE_VERSION; }
-  const char* GetDescription() VTK_FUTURE_CONST override { return "Halite, exact volume rendering of unstructured grids"; }
+  const char* GetDescription() VTK_FUTURE_CONST override
+  {
+    return "Halite, exact volume rendering of unstructured grids";
+  }
 
 protected:
   vtkHaliteFactory()

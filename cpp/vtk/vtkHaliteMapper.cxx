@@ -96,22 +96,29 @@ void vtkHaliteMapper::Render(vtkRenderer* renderer, vtkVolume* volume)
   const vtkSmartPointer<vtkVolume> keptVolume(volume);
   if (inner.IsAtWork)
   {
-    inner.Remark("this mapper is drawing a frame, and leaves out the one that an observer of that asks for: draw when the "
-                 "first is over, or give the other window a mapper of its own");
+    inner.WarnOnce(
+      "this mapper is drawing a frame, and leaves out the one that an observer of that asks for: draw when the "
+      "first is over, or give the other window a mapper of its own");
     return;
   }
-  const Internals::Turn turn(inner, renderer->GetVTKWindow());
+  const vtkSmartPointer<vtkOpenGLRenderWindow> window = vtkOpenGLRenderWindow::SafeDownCast(renderer->GetVTKWindow());
+  const Internals::Turn turn(inner, window, renderer);
   this->PrepareTime = this->DepthTime = this->CoreTime = this->PresentTime = 0;
   this->TimeToDraw = 0;
 
-  const vtkSmartPointer<vtkOpenGLRenderWindow> window = vtkOpenGLRenderWindow::SafeDownCast(renderer->GetVTKWindow());
   if (!window)
   {
-    inner.Say("Halite draws in OpenGL windows only, and this is none");
+    inner.ErrorOnce("Halite draws in OpenGL windows only, and this is none");
     return;
   }
   FrameGuard::Keep(window, renderer, volume, this);
+  FrameGuard::KeepContext(window);
+  const bool hadContext = Presenter::HasContext(window);
   inner.DrawIn(window, renderer, volume);
+  if (hadContext)
+  {
+    inner.Mend();
+  }
   FrameGuard::GiveBack(window, volume, this);
 }
 
@@ -126,32 +133,33 @@ void vtkHaliteMapper::Internals::DrawIn(vtkOpenGLRenderWindow* window, vtkRender
   // scene, once.
   const bool isMaximum = this->Self.GetBlendMode() == vtkUnstructuredGridVolumeMapper::MAXIMUM_INTENSITY_BLEND;
   vtkOpenGLRenderPass* pass = nullptr;
-  if (!this->DrawsLate && IsPeeled(volume))
+  if (!this->DrawsDeferred && IsPeeled(volume))
   {
     pass = isMaximum ? nullptr : Peeling::PassOf(&this->Self, volume);
+    this->TargetPass = pass;
     if (!pass)
     {
-      this->Remark("Halite draws this volume over translucent geometry, not between its layers");
-      this->PutOff(renderer, volume);
+      this->WarnOnce("Halite draws this volume over translucent geometry, not between its layers");
+      this->Defer(renderer, volume);
       return;
     }
   }
   const vtkSmartPointer<vtkDataSet> grid = vtkDataSet::SafeDownCast(this->Self.GetInputDataObject(0, 0));
   if (!grid || !volume->GetProperty())
   {
-    this->Say("there is no grid to draw: SetInputData or SetInputConnection gives the mapper one");
+    this->ErrorOnce("there is no grid to draw: SetInputData or SetInputConnection gives the mapper one");
     return;
   }
   if (grid->GetNumberOfCells() == 0)
   {
     return;
   }
-  const Viewport viewport = Presenter::ViewportOf(window, renderer, renderer->GetPass() && !this->DrawsLate);
+  const Viewport viewport = Presenter::ViewportOf(window, renderer, renderer->GetPass() && !this->DrawsDeferred);
   if (viewport.Width <= 0 || viewport.Height <= 0)
   {
     return;
   }
-  this->RemarkOn(volume->GetProperty());
+  this->WarnOfUnsupported(volume->GetProperty());
 
   Clock clock(this->Self.TimeToDraw);
   Key wanted;
@@ -189,44 +197,44 @@ void vtkHaliteMapper::Internals::DrawIn(vtkOpenGLRenderWindow* window, vtkRender
   catch (const halite::Error& error)
   {
     this->Failed = wanted;
-    this->Warn();
-    this->Say(error.what());
+    this->ReportWarnings();
+    this->ErrorOnce(error.what());
   }
   catch (const std::exception& error)
   {
     // Of the window, which may be another one next time, or able to.
-    this->Say(error.what());
+    this->ErrorOnce(error.what());
   }
 }
 
-void vtkHaliteMapper::DrawLate(vtkObject* caller, unsigned long, void*)
+void vtkHaliteMapper::DrawDeferred(vtkObject* caller, unsigned long, void*)
 {
   const vtkSmartPointer<vtkHaliteMapper> self(this);
   Internals& inner = *this->Inner;
-  std::list<Internals::Late> due;
-  for (auto late = inner.Lates.begin(); late != inner.Lates.end();)
+  std::list<Internals::DeferredDraw> due;
+  for (auto deferred = inner.DeferredDraws.begin(); deferred != inner.DeferredDraws.end();)
   {
-    auto next = std::next(late);
-    if (!late->Renderer || late->Renderer == caller)
+    auto next = std::next(deferred);
+    if (!deferred->Renderer || deferred->Renderer == caller)
     {
-      due.splice(due.end(), inner.Lates, late);
+      due.splice(due.end(), inner.DeferredDraws, deferred);
     }
-    late = next;
+    deferred = next;
   }
-  const bool drewLate = inner.DrawsLate;
-  inner.DrawsLate = true;
-  for (const Internals::Late& late : due)
+  const bool drewDeferred = inner.DrawsDeferred;
+  inner.DrawsDeferred = true;
+  for (const Internals::DeferredDraw& deferred : due)
   {
-    if (late.Renderer)
+    if (deferred.Renderer)
     {
-      late.Renderer->RemoveObserver(late.Observer);
-      if (late.Volume)
+      deferred.Renderer->RemoveObserver(deferred.Observer);
+      if (deferred.Volume)
       {
-        this->Render(late.Renderer, late.Volume);
+        this->Render(deferred.Renderer, deferred.Volume);
       }
     }
   }
-  inner.DrawsLate = drewLate;
+  inner.DrawsDeferred = drewDeferred;
 }
 
 void vtkHaliteMapper::ReleaseGraphicsResources(vtkWindow* window)

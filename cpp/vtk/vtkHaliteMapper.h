@@ -252,7 +252,7 @@ protected:
   /**
    * Draws what was put off until a renderer has finished.
    */
-  void DrawLate(vtkObject* caller, unsigned long event, void* data);
+  void DrawDeferred(vtkObject* caller, unsigned long event, void* data);
 
   int FillInputPortInformation(int port, vtkInformation* information) override;
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 #include "vtkHaliteMapperInternals.h"
 
+#include "FrameGuard.h"
 #include "MeshView.h"
 #include "Peeling.h"
 
@@ -19,7 +20,7 @@
 
 VTK_ABI_NAMESPACE_BEGIN
 
-void vtkHaliteMapper::Internals::Say(const std::string& what)
+void vtkHaliteMapper::Internals::ErrorOnce(const std::string& what)
 {
   if (this->Errors.insert(Messages::WithoutNumbers(what)).second)
   {
@@ -27,15 +28,15 @@ void vtkHaliteMapper::Internals::Say(const std::string& what)
   }
 }
 
-void vtkHaliteMapper::Internals::Remark(const std::string& what)
+void vtkHaliteMapper::Internals::WarnOnce(const std::string& what)
 {
-  if (this->Remarks.insert(what).second)
+  if (this->Warned.insert(what).second)
   {
     vtkWarningWithObjectMacro(&this->Self, << what);
   }
 }
 
-void vtkHaliteMapper::Internals::Warn()
+void vtkHaliteMapper::Internals::ReportWarnings()
 {
   for (const std::string& warning : this->Core.TakeWarnings())
   {
@@ -62,8 +63,8 @@ void vtkHaliteMapper::Internals::Release(vtkWindow* window)
   };
   this->IsReleased |= window == this->Target;
   // Where a renderer comes to a window VTK releases what is of no window: that is nothing of ours.
-  take(this->Frames, this->OldFrames,
-    [&](const Frame& f) { return !f.Renderer || f.Renderer->GetVTKWindow() == window; });
+  take(
+    this->Frames, this->OldFrames, [&](const Frame& f) { return !f.Renderer || f.Renderer->GetVTKWindow() == window; });
   take(this->Presenters, this->OldPresenters,
     [&](const Presenter& p) { return !p.GetWindow() || p.GetWindow() == window; });
 }
@@ -100,25 +101,25 @@ vtkHaliteMapper::Internals::Frame& vtkHaliteMapper::Internals::FrameOf(vtkRender
   return f;
 }
 
-void vtkHaliteMapper::Internals::RemarkOn(vtkVolumeProperty* property)
+void vtkHaliteMapper::Internals::WarnOfUnsupported(vtkVolumeProperty* property)
 {
   if (property->GetShade(0))
   {
-    this->Remark("Halite does not shade: the volume emits light and absorbs it");
+    this->WarnOnce("Halite does not shade: the volume emits light and absorbs it");
   }
   // With 2D functions, VTK says that there is gradient opacity.
   if (property->GetTransferFunctionMode() == vtkVolumeProperty::TF_2D)
   {
-    this->Remark("Halite does not draw 2D transfer functions; the 1D functions are used");
+    this->WarnOnce("Halite does not draw 2D transfer functions; the 1D functions are used");
   }
   else if (property->HasGradientOpacity(0) && !property->GetDisableGradientOpacity(0))
   {
-    this->Remark("Halite does not draw gradient opacity");
+    this->WarnOnce("Halite does not draw gradient opacity");
   }
   const int blend = this->Self.GetBlendMode();
   if (blend != COMPOSITE_BLEND && blend != MAXIMUM_INTENSITY_BLEND)
   {
-    this->Remark("Halite does not draw blend mode " + std::to_string(blend) +
+    this->WarnOnce("Halite does not draw blend mode " + std::to_string(blend) +
       " (it has composite and maximum intensity); composite is used");
   }
 }
@@ -143,10 +144,23 @@ Content vtkHaliteMapper::Internals::Choose(vtkDataSet* grid, vtkVolume* volume)
     grid, this->Self.ScalarMode, this->Self.ArrayAccessMode, this->Self.ArrayId, this->Self.ArrayName, cellFlag);
   const bool isSlab = this->Self.OpacityConvention == vtkHaliteMapper::OPACITY ||
     (this->Self.OpacityConvention == vtkHaliteMapper::BY_INPUT && MeshView::IsGrid(grid));
-  const auto convention = isSlab
-    ? halite::OpacityConvention::Opacity
-    : halite::OpacityConvention::Extinction;
+  const auto convention = isSlab ? halite::OpacityConvention::Opacity : halite::OpacityConvention::Extinction;
   return Content(settings, grid, array, cellFlag, volume, convention, this->Knots);
+}
+
+void vtkHaliteMapper::Internals::Mend()
+{
+  FrameGuard::GiveBack(this->Target, this->TargetRenderer);
+  // Observers may have drawn elsewhere, or finalized the window: VTK goes on with its frame, and needs what that began with.
+  if (!Presenter::HasContext(this->Target))
+  {
+    this->Target->Start();
+    this->IsReleased = true;
+  }
+  if (this->TargetPass)
+  {
+    Peeling::Restore(this->TargetPass);
+  }
 }
 
 bool vtkHaliteMapper::Internals::Draw(
@@ -180,15 +194,10 @@ bool vtkHaliteMapper::Internals::Draw(
   }
   if (!thrown.empty())
   {
-    this->Say(thrown);
+    this->ErrorOnce(thrown);
   }
-  this->Warn();
-  // Observers may have drawn elsewhere, or finalized the window: VTK goes on with its frame, and needs what that began with.
-  if (!Presenter::HasContext(window))
-  {
-    window->Start();
-    this->IsReleased = true;
-  }
+  this->ReportWarnings();
+  this->Mend();
   return finished && !this->IsReleased;
 }
 
@@ -199,7 +208,8 @@ bool vtkHaliteMapper::Internals::Show(
   const int width = static_cast<int>(view.View.width), height = static_cast<int>(view.View.height);
   std::vector<float> depths;
   // Where nothing was drawn and nothing kept, nothing ends rays.
-  if (viewport.IsOfPass || renderer->GetNumberOfPropsRendered() > 0 || renderer->GetPreserveDepthBuffer() || !renderer->GetErase())
+  if (viewport.IsOfPass || renderer->GetNumberOfPropsRendered() > 0 || renderer->GetPreserveDepthBuffer() ||
+    !renderer->GetErase())
   {
     Clock clock(this->Self.DepthTime);
     Presenter::ReadDepths(presenter.GetWindow(), viewport, width, height, depths);
@@ -236,10 +246,10 @@ bool vtkHaliteMapper::Internals::Peel(
   vtkVolume* volume = frame.Volume;
   Peeling& peeling = presenter.GetPeeling();
   const int width = static_cast<int>(view.View.width), height = static_cast<int>(view.View.height);
-  std::vector<Parts> parts;
+  std::vector<Intervals> intervals;
   {
     Clock clock(this->Self.DepthTime);
-    peeling.Ask(pass, &this->Self, volume, width, height, parts);
+    peeling.ReadIntervals(pass, &this->Self, volume, width, height, intervals);
   }
   const bool isOutside = peeling.IsOutside();
   if (isOutside)
@@ -247,18 +257,19 @@ bool vtkHaliteMapper::Internals::Peel(
     frame.Kept.clear();
     frame.Layers.DropUnused();
   }
-  const bool isComplete = frame.Layers.Complete(parts, [&](const std::vector<float>& ends, std::vector<float>& pixels) {
-    view.View.depths = ends;
-    return this->Draw(content, view.View, presenter.GetWindow(), pixels);
-  });
+  const bool isComplete =
+    frame.Layers.Complete(intervals, [&](const std::vector<float>& ends, std::vector<float>& pixels) {
+      view.View.depths = ends;
+      return this->Draw(content, view.View, presenter.GetWindow(), pixels);
+    });
   if (!isComplete)
   {
     return false;
   }
   Clock clock(this->Self.PresentTime);
   const bool isAlone = volume->GetMapper() == &this->Self && renderer->GetVolumes()->GetNumberOfItems() == 1;
-  std::vector<float> kept, front = frame.Layers.PictureOf(parts, &Parts::Front);
-  const std::vector<float> back = frame.Layers.PictureOf(parts, &Parts::Back);
+  std::vector<float> kept, front = frame.Layers.PictureOf(intervals, &Intervals::Front);
+  const std::vector<float> back = frame.Layers.PictureOf(intervals, &Intervals::Back);
   kept.swap(frame.Kept);
   if (isOutside && isAlone && renderer->GetMaximumNumberOfPeels() > 0)
   {
@@ -267,19 +278,19 @@ bool vtkHaliteMapper::Internals::Peel(
   const auto textureOf = [&](const std::vector<float>& pixels) {
     return pixels.empty() ? presenter.Upload(1, 1, { 0, 0, 0, 0 }) : presenter.Upload(width, height, pixels);
   };
-  peeling.Answer(pass, &this->Self, volume, isAlone, textureOf(kept), textureOf(front), textureOf(back));
+  peeling.Composite(pass, &this->Self, volume, isAlone, textureOf(kept), textureOf(front), textureOf(back));
   return true;
 }
 
-void vtkHaliteMapper::Internals::PutOff(vtkRenderer* renderer, vtkVolume* volume)
+void vtkHaliteMapper::Internals::Defer(vtkRenderer* renderer, vtkVolume* volume)
 {
-  const bool waits = std::any_of(this->Lates.begin(), this->Lates.end(),
-    [&](const Late& l) { return l.Renderer == renderer && l.Volume == volume; });
+  const bool waits = std::any_of(this->DeferredDraws.begin(), this->DeferredDraws.end(),
+    [&](const DeferredDraw& l) { return l.Renderer == renderer && l.Volume == volume; });
   if (!waits)
   {
     const unsigned long observer =
-      renderer->AddObserver(vtkCommand::EndEvent, &this->Self, &vtkHaliteMapper::DrawLate);
-    this->Lates.push_back({ renderer, volume, observer });
+      renderer->AddObserver(vtkCommand::EndEvent, &this->Self, &vtkHaliteMapper::DrawDeferred);
+    this->DeferredDraws.push_back({ renderer, volume, observer });
   }
 }
 

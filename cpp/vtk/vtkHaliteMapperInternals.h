@@ -63,7 +63,7 @@ struct vtkHaliteMapper::Internals
   };
 
   // What is to be drawn once a renderer has finished.
-  struct Late
+  struct DeferredDraw
   {
     vtkWeakPointer<vtkRenderer> Renderer;
     vtkWeakPointer<vtkVolume> Volume;
@@ -80,15 +80,17 @@ struct vtkHaliteMapper::Internals
   // What of the content failed since something was drawn, and what for: nothing of that is tried, and nothing is said, twice.
   Key Failed;
   std::set<std::string> Errors;
-  std::set<std::string> Remarks;
+  std::set<std::string> Warned;
   std::vector<float> Pixels;
   std::string Adapter;
-  std::list<Late> Lates;
-  bool DrawsLate = false;
+  std::list<DeferredDraw> DeferredDraws;
+  bool DrawsDeferred = false;
   // A frame that is at work, in which observers may do anything: whether what it draws to was released since it began, and
   // what was released, which goes when it is over.
   bool IsAtWork = false;
-  vtkWindow* Target = nullptr;
+  vtkOpenGLRenderWindow* Target = nullptr;
+  vtkRenderer* TargetRenderer = nullptr;
+  vtkOpenGLRenderPass* TargetPass = nullptr;
   bool IsReleased = false;
   std::list<Frame> OldFrames;
   std::list<Presenter> OldPresenters;
@@ -97,17 +99,20 @@ struct vtkHaliteMapper::Internals
   class Turn
   {
   public:
-    Turn(Internals& self, vtkWindow* target)
+    Turn(Internals& self, vtkOpenGLRenderWindow* window, vtkRenderer* renderer)
       : Self(self)
     {
       self.IsAtWork = true;
-      self.Target = target;
+      self.Target = window;
+      self.TargetRenderer = renderer;
+      self.TargetPass = nullptr;
       self.IsReleased = false;
     }
     ~Turn()
     {
       this->Self.OldFrames.clear();
       this->Self.OldPresenters.clear();
+      this->Self.Target = nullptr;
       this->Self.IsAtWork = false;
     }
 
@@ -121,12 +126,12 @@ struct vtkHaliteMapper::Internals
   }
 
   // An error, once until something is drawn; a warning of the mapper's own, once.
-  void Say(const std::string& what);
-  void Remark(const std::string& what);
+  void ErrorOnce(const std::string& what);
+  void WarnOnce(const std::string& what);
   // Warnings of the core.
-  void Warn();
+  void ReportWarnings();
   // What of the property is not drawn.
-  void RemarkOn(vtkVolumeProperty* property);
+  void WarnOfUnsupported(vtkVolumeProperty* property);
 
   Presenter& PresenterOf(vtkOpenGLRenderWindow* window);
   Frame& FrameOf(vtkRenderer* renderer, vtkVolume* volume);
@@ -134,13 +139,17 @@ struct vtkHaliteMapper::Internals
   void Release(vtkWindow* window);
   Content Choose(vtkDataSet* grid, vtkVolume* volume);
   // Draws once the renderer has finished.
-  void PutOff(vtkRenderer* renderer, vtkVolume* volume);
+  void Defer(vtkRenderer* renderer, vtkVolume* volume);
+
+  // Puts right what observers of the frame that is at work did to what VTK draws it with: its window, renderer and pass.
+  void Mend();
 
   // Draws a volume in a window, or says what is in the way.
   void DrawIn(vtkOpenGLRenderWindow* window, vtkRenderer* renderer, vtkVolume* volume);
 
   // These are false if what they draw was given up. By the core:
-  bool Draw(const Content& content, const halite::View& view, vtkOpenGLRenderWindow* window, std::vector<float>& pixels);
+  bool Draw(
+    const Content& content, const halite::View& view, vtkOpenGLRenderWindow* window, std::vector<float>& pixels);
   // Into the window, as one picture:
   bool Show(const Content& content, SceneView& view, const Viewport& viewport, Presenter& presenter, Frame& frame);
   // Into the layers of a pass of depth peeling:

@@ -2,6 +2,7 @@
 
 use super::bridge::{Numbers, Type};
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::mesh::{Values, with_values};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -28,17 +29,21 @@ fn size_of(kind: Type) -> usize {
 /// A copy of numbers.
 pub(super) fn values(numbers: &Numbers) -> Result<Values> {
     Ok(match numbers.kind {
-        Type::I8 => Values::I8(cast(numbers)?.to_vec()),
-        Type::U8 => Values::U8(cast(numbers)?.to_vec()),
-        Type::I16 => Values::I16(cast(numbers)?.to_vec()),
-        Type::U16 => Values::U16(cast(numbers)?.to_vec()),
-        Type::I32 => Values::I32(cast(numbers)?.to_vec()),
-        Type::U32 => Values::U32(cast(numbers)?.to_vec()),
-        Type::I64 => Values::I64(cast(numbers)?.to_vec()),
-        Type::U64 => Values::U64(cast(numbers)?.to_vec()),
-        Type::F32 => Values::F32(cast(numbers)?.to_vec()),
-        _ => Values::F64(cast(numbers)?.to_vec()),
+        Type::I8 => Values::I8(copied(numbers)?),
+        Type::U8 => Values::U8(copied(numbers)?),
+        Type::I16 => Values::I16(copied(numbers)?),
+        Type::U16 => Values::U16(copied(numbers)?),
+        Type::I32 => Values::I32(copied(numbers)?),
+        Type::U32 => Values::U32(copied(numbers)?),
+        Type::I64 => Values::I64(copied(numbers)?),
+        Type::U64 => Values::U64(copied(numbers)?),
+        Type::F32 => Values::F32(copied(numbers)?),
+        _ => Values::F64(copied(numbers)?),
     })
+}
+
+fn copied<T: bytemuck::Pod>(numbers: &Numbers) -> Result<Vec<T>> {
+    memory::copied("a copy of an array", cast(numbers)?)
 }
 
 /// Points, of coordinates of any type.
@@ -48,6 +53,7 @@ pub(super) fn triples(numbers: &Numbers) -> Result<Vec<DVec3>> {
     if !count.is_multiple_of(3) {
         return Err(Error::Mesh(format!("points have three coordinates each, and here are {count} numbers")));
     }
+    memory::check_array::<f64>("a copy of the points", count)?;
     match numbers.kind {
         Type::F64 => Ok(cast::<f64>(numbers)?.as_chunks().0.par_iter().map(|&p| DVec3::from_array(p)).collect()),
         Type::F32 => {
@@ -63,11 +69,12 @@ pub(super) fn triples(numbers: &Numbers) -> Result<Vec<DVec3>> {
 /// Integers from 0 on.
 pub(super) fn indices(what: &str, numbers: Numbers) -> Result<Vec<u64>> {
     let negative = || Error::Mesh(format!("{what} are negative, or no integers"));
+    memory::check_array::<u64>(format_args!("a copy of the {what}"), numbers.bytes.len() / size_of(numbers.kind))?;
     match numbers.kind {
         Type::I32 => cast::<i32>(&numbers)?.par_iter().map(|&i| u64::try_from(i).map_err(|_| negative())).collect(),
         Type::I64 => cast::<i64>(&numbers)?.par_iter().map(|&i| u64::try_from(i).map_err(|_| negative())).collect(),
         Type::U32 => Ok(cast::<u32>(&numbers)?.iter().map(|&i| u64::from(i)).collect()),
-        Type::U64 => Ok(cast::<u64>(&numbers)?.to_vec()),
+        Type::U64 => copied(&numbers),
         _ => Err(negative()),
     }
 }
@@ -75,7 +82,11 @@ pub(super) fn indices(what: &str, numbers: Numbers) -> Result<Vec<u64>> {
 pub(super) fn point_ids(numbers: Numbers) -> Result<Vec<u32>> {
     let narrow = |i: u64| u32::try_from(i).map_err(|_| Error::Mesh(format!("a cell names point {i}")));
     match numbers.kind {
-        Type::U32 => Ok(cast::<u32>(&numbers)?.to_vec()),
-        _ => indices("point indices", numbers)?.into_par_iter().map(narrow).collect(),
+        Type::U32 => copied(&numbers),
+        _ => {
+            let wide = indices("point indices", numbers)?;
+            memory::check_array::<u32>("a copy of the point indices", wide.len())?;
+            wide.into_par_iter().map(narrow).collect()
+        }
     }
 }

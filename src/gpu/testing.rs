@@ -12,7 +12,7 @@ pub(crate) fn choice() -> Option<DeviceChoice> {
         Ok(_) => Some(choice),
         Err(e) if std::env::var("HALITE_REQUIRE_GPU").is_ok_and(|v| v == "1") => panic!("{e}"),
         Err(e) => {
-            eprintln!("SKIPPED, as there is no GPU to test: {e}");
+            eprintln!("skipped: there is no GPU to test: {e}");
             None
         }
     }

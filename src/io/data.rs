@@ -11,6 +11,7 @@ use super::number::Kind;
 use super::text;
 use super::unpack::{Codec, Unpacker};
 use crate::error::{Error, Result};
+use crate::memory;
 use base64::Engine;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use rayon::prelude::*;
@@ -96,10 +97,18 @@ pub(super) struct Appended {
 }
 
 /// Why an array cannot be read; [`Store`] adds its name.
-enum Fault {
+pub(super) enum Fault {
     Io(std::io::Error),
     Malformed(String),
     Unsupported(String),
+    /// There is no memory for it.
+    Lacking(Error),
+}
+
+impl From<Error> for Fault {
+    fn from(error: Error) -> Self {
+        Fault::Lacking(error)
+    }
 }
 
 impl From<std::io::Error> for Fault {
@@ -128,6 +137,7 @@ impl Store {
             Fault::Io(source) => Error::file(&self.input.path, source),
             Fault::Malformed(what) => Error::malformed(&self.input.path, format!("{array}: {what}")),
             Fault::Unsupported(what) => Error::unsupported(&self.input.path, format!("{array}: {what}")),
+            Fault::Lacking(error) => error,
         }
     }
 
@@ -216,7 +226,7 @@ impl Store {
         if size > bytes.length() {
             return Err("the file ends inside its header".to_owned().into());
         }
-        let mut head = vec![0; size as usize];
+        let mut head = memory::zeroed("the sizes of an array's blocks", size as usize)?;
         bytes.read(0, &mut head)?;
         let word = |word: &[u8]| {
             let digit = |value: u64, byte: &u8| value << 8 | u64::from(*byte);
@@ -339,7 +349,8 @@ impl Contents<'_> {
     pub(super) fn read<U: bytemuck::Pod>(self, count: u64, progress: &Progress<'_>, put: &Put<'_>) -> Result<Vec<U>> {
         let mut out = Vec::new();
         let result = self.check(count).and_then(|()| {
-            out = vec![U::zeroed(); usize::try_from(count).map_err(|_| "it is too large".to_owned())?];
+            let what = format_args!("{}, {}", self.store.input.path.display(), self.array);
+            out = memory::zeroed(what, usize::try_from(count).map_err(|_| "it is too large".to_owned())?)?;
             let (bytes, size) = (bytemuck::cast_slice_mut(&mut out), size_of::<U>());
             let put = |first, numbers: &[u8], out: &mut [u8]| {
                 progress.add(out.len() / size);
@@ -405,7 +416,7 @@ impl Blocks {
         if self.packed.is_some() && !self.size.is_multiple_of(kind.size()) && self.total > self.size as u64 {
             // Blocks that cut numbers in two are put together first.
             let count = self.total as usize;
-            let mut whole = vec![0; count];
+            let mut whole = memory::zeroed("the blocks of an array", count)?;
             self.fill(Kind::U8, false, &mut whole, 1, &|_, from: &[u8], to: &mut [u8]| {
                 to.copy_from_slice(from);
                 Ok(())
@@ -420,14 +431,15 @@ impl Blocks {
         out.par_chunks_mut(per_block * size).enumerate().try_for_each_init(scratch, |scratch, (block, out)| {
             let Scratch { numbers, unpacker } = scratch;
             if let Some((codec, starts)) = &self.packed {
-                let mut packed = unpacker.buffer((starts[block + 1] - starts[block]) as usize);
+                let mut packed = unpacker.buffer((starts[block + 1] - starts[block]) as usize)?;
                 self.body.read(starts[block], &mut packed)?;
                 let whole = if block as u64 == (self.total - 1) / self.size as u64 {
                     self.total as usize - block * self.size
                 } else {
                     self.size
                 };
-                unpacker.start(*codec, packed, whole).map_err(|why| format!("its block {block} {why}"))?;
+                let is_valid = unpacker.start(*codec, packed, whole)?;
+                is_valid.map_err(|why| format!("its block {block} {why}"))?;
             }
             for (chunk, out) in out.chunks_mut(per_chunk * size).enumerate() {
                 let first = block * per_block + chunk * per_chunk;

@@ -2,6 +2,7 @@
 
 use super::validated;
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::mesh::with_values;
 use crate::mesh::{Array, Attributes, Cells, Mesh, MeshParts, Polyhedra, Values};
 use std::path::Path;
@@ -17,6 +18,8 @@ pub(super) fn joined(path: &Path, mut meshes: Vec<Mesh>) -> Result<Mesh> {
         let what = format!("{points} points are more than Halite can index (2^32 - 2)");
         return Err(Error::unsupported(path, what));
     }
+    let bytes: u64 = meshes.iter().map(Mesh::bytes).sum();
+    memory::check_array::<u8>("one mesh of all its files", bytes as usize)?;
     let mut parts: Vec<MeshParts> = meshes.into_iter().map(Mesh::into_parts).collect();
     let arrays = [0, 1].map(|of| {
         let tuples = |part: &MeshParts| if of == 0 { part.points.len() } else { part.cells.len() };

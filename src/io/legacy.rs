@@ -14,6 +14,7 @@ use super::input::Input;
 use super::vtu::renumber;
 use super::{DataSet, MOST_WARNINGS, refuse, validated, warn_of_left_out};
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::mesh::{Array, Attributes, Cells, Mesh, POLYHEDRON, Polyhedra, Values};
 use glam::DVec3;
 use scan::{Fault, Scanner, Type};
@@ -48,7 +49,13 @@ pub(super) fn read(input: &Input) -> Result<DataSet> {
         None => return Err(Error::malformed(path, "there is no data set in it")),
     }
     let mut parts = Parts::default();
-    if let Err(what) = parts.scan(&mut scanner) {
+    let scanned = parts.scan(&mut scanner);
+    if let Some(error) = scanner.lacking {
+        return Err(error);
+    }
+    if let Err(what) = scanned {
+        // Its numbers once as they are, and once as they are kept.
+        memory::check_array::<u8>("another reading of the file", 2 * bytes.len())?;
         parts = Parts::parsed(&bytes).ok_or_else(|| Error::malformed(path, what))?;
     }
     parts.mesh(path, version).map(DataSet::Mesh)
@@ -117,6 +124,7 @@ impl Parts {
                 let count = from.count("the number of points")?;
                 let kind = Type::from_name(&from.word("their type")?, from.binary)?;
                 let values = from.values(kind, count.checked_mul(3))?.ok_or("they are strings")?;
+                from.had(memory::check_array::<DVec3>("its points", count))?;
                 let coordinate = |i| values.get(i);
                 let point = |p: usize| DVec3::from_array([0, 1, 2].map(|i| coordinate(3 * p + i)));
                 self.points = Some((0..count).map(point).collect());
@@ -125,7 +133,9 @@ impl Parts {
             _ => {
                 let count = from.count("the number of cells")?;
                 from.enter_numbers();
-                let types = from.numbers::<i32>(count)?.into_iter().enumerate();
+                let types = from.numbers::<i32>(count)?;
+                from.had(memory::check_array::<u8>("the types of its cells", count))?;
+                let types = types.into_iter().enumerate();
                 let narrow = |(c, kind)| u8::try_from(kind).map_err(|_| format!("the type of cell {c} is {kind}"));
                 self.types = Some(types.map(narrow).collect::<Result<_, _>>()?);
             }
@@ -145,6 +155,7 @@ impl Parts {
             from.enter_numbers();
             let list = from.numbers::<i32>(size)?;
             // What is negative is out of range in any case.
+            from.had(memory::check_array::<u32>("its cells", 2 * size + 2 * count))?;
             let list: Vec<u32> = list.into_iter().map(|n| u32::try_from(n).unwrap_or(u32::MAX)).collect();
             return self.unpack(&list, count);
         }
@@ -158,6 +169,7 @@ impl Parts {
         }
         let points = list(from, size)?;
         // Exact to 2^53; what is negative is out of range, as is what is larger.
+        from.had(memory::check_array::<u64>("its cells", offsets.len() + points.len() / 2))?;
         let index = |x: f64| if x < 0.0 { u64::MAX } else { x as u64 };
         self.offsets = Some((0..offsets.len()).map(|i| index(offsets.get(i))).collect());
         let point = |i| u32::try_from(index(points.get(i))).unwrap_or(u32::MAX);
@@ -168,7 +180,8 @@ impl Parts {
     /// Takes apart a list of cells: the number of points of each, and these.
     fn unpack(&mut self, list: &[u32], count: usize) -> Result<(), Fault> {
         let mut rest = list;
-        let mut offsets = vec![0];
+        let mut offsets = Vec::with_capacity(count.min(list.len()) + 1);
+        offsets.push(0);
         while let Some((own, after)) = rest.split_first() {
             let cell = offsets.len() - 1;
             let (points, after) = after

@@ -1,5 +1,6 @@
 //! The compressors of VTK XML files: one block after another, each in as many parts as wanted.
 
+use crate::memory;
 use flate2::{Decompress, FlushDecompress, Status};
 use lzma_rust2::XzReader;
 use std::io::Read;
@@ -48,26 +49,32 @@ pub(super) struct Unpacker {
 
 impl Unpacker {
     /// A buffer for the packed bytes, to be given to [`Unpacker::start`].
-    pub(super) fn buffer(&mut self, packed: usize) -> Vec<u8> {
+    ///
+    /// # Errors
+    /// [`crate::error::Error::NoMemory`].
+    pub(super) fn buffer(&mut self, packed: usize) -> crate::Result<Vec<u8>> {
         let mut buffer = std::mem::take(&mut self.packed);
-        buffer.resize(packed, 0);
-        buffer
+        resize(&mut buffer, packed)?;
+        Ok(buffer)
     }
 
-    /// Starts a block of `size` bytes.
-    pub(super) fn start(&mut self, codec: Codec, packed: Vec<u8>, size: usize) -> Result<(), String> {
+    /// Starts a block of `size` bytes, and says whether it is valid.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::NoMemory`].
+    pub(super) fn start(&mut self, codec: Codec, packed: Vec<u8>, size: usize) -> crate::Result<Result<(), String>> {
         (self.packed, self.used) = (packed, 0);
         if codec == Codec::Zlib {
             self.inflate.get_or_insert_with(|| Decompress::new(true)).reset(true);
-            return Ok(());
+            return Ok(Ok(()));
         }
         let whole = self.whole.get_or_insert_default();
-        whole.resize(size, 0);
+        resize(whole, size)?;
         let (name, done) = match codec {
             Codec::Lz4 => ("LZ4", lz4_flex::block::decompress_into(&self.packed, whole).is_ok_and(|n| n == size)),
             _ => ("LZMA", unpack_xz(&self.packed, whole)),
         };
-        if done { Ok(()) } else { Err(format!("is not valid {name} data")) }
+        Ok(if done { Ok(()) } else { Err(format!("is not valid {name} data")) })
     }
 
     /// Unpacks the next bytes, as many as `out` has.
@@ -103,6 +110,13 @@ impl Unpacker {
         self.used += (inflate.total_in() - before.0) as usize;
         Some((status, (inflate.total_out() - before.1) as usize))
     }
+}
+
+/// Makes a buffer so long; what is new is 0.
+fn resize(buffer: &mut Vec<u8>, bytes: usize) -> crate::Result<()> {
+    memory::reserve("a block of a compressed array", buffer, bytes.saturating_sub(buffer.len()))?;
+    buffer.resize(bytes, 0);
+    Ok(())
 }
 
 /// Unpacks an .xz stream of one filter, which must fill `out`.

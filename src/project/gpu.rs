@@ -6,12 +6,13 @@
 //! 3. Batch by batch, in that order, `project` (compute) makes a record of each cell, and the records are drawn.
 
 mod drawing;
+mod frame;
+mod keys;
+mod lines;
 mod ordering;
 mod program;
+mod record;
 
-use super::frame::Seen;
-use super::lines::{self, Extent, Lines};
-use super::record::Layout;
 use super::{Counts, Fragments, Switches, Target};
 use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Values};
@@ -24,8 +25,11 @@ use crate::integral::{Exact, Lookup};
 use crate::view::{Blend, View};
 use bytemuck::{Pod, Zeroable};
 use drawing::Canvas;
+use frame::Seen;
+use lines::{Extent, Lines};
 use ordering::Ordered;
 use program::{Program, program};
+use record::Layout;
 use std::sync::Arc;
 use std::time::Instant;
 use wgpu::{BufferUsages as Usage, ShaderStages as Stages};
@@ -239,6 +243,7 @@ impl Project {
             let start = Instant::now();
             self.ordered = None;
             self.ordered = Some(self.order(&frame, &seen, geometry, values, switches, lines)?);
+            counts.sorts = 1;
             counts.order_ms = start.elapsed().as_secs_f64() * 1e3;
         }
         self.draw(&frame, view, &mut counts).map(|pixels| (pixels, counts))

@@ -1,10 +1,10 @@
 //! What draws a renderer's frames: one variant for each engine and where it runs. An engine is added by a variant here, and by
 //! what it does in each of these methods.
 
-use super::Frame;
+use super::frame::Frame;
 use super::stats::{ProjectionStats, SweepStats};
 use crate::error::{Error, Result};
-use crate::geometry::Values;
+use crate::geometry::{Geometry, Values};
 use crate::gpu::{DeviceChoice, Gpu, Part};
 use crate::integral::{Exact, Integral, Lookup};
 use crate::project::cpu::{self as sweep, Sweep};
@@ -27,6 +27,22 @@ pub(crate) enum Backend {
     Project(Box<Sweep>),
     /// Projected cells on a device.
     ProjectOnDevice(Box<Project>),
+}
+
+/// What a backend needs of a mesh. One without that is left to the walk on the CPU, which draws all.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Needs {
+    /// It reads the neighbours of cells and the boundary.
+    pub(super) neighbours: bool,
+    /// Its lengths are of 32 bits, which do not tell those across a flat mesh: see [`Geometry::is_flat`].
+    thickness: bool,
+}
+
+impl Needs {
+    /// Whether the backend can draw the mesh.
+    pub(super) fn are_met_by(self, geometry: &Geometry) -> bool {
+        !self.thickness || !geometry.is_flat()
+    }
 }
 
 /// A frame, and what it took.
@@ -108,9 +124,13 @@ impl Backend {
         matches!(self, Backend::WalkOnDevice(_))
     }
 
-    /// Whether it reads the neighbours of cells and the boundary.
-    pub(super) fn needs_neighbours(&self) -> bool {
-        !matches!(self, Backend::ProjectOnDevice(_))
+    /// What it needs of a mesh.
+    pub(super) fn needs(&self) -> Needs {
+        match self {
+            Backend::Walk | Backend::Project(_) => Needs { neighbours: true, thickness: false },
+            Backend::WalkOnDevice(_) => Needs { neighbours: true, thickness: true },
+            Backend::ProjectOnDevice(_) => Needs { neighbours: false, thickness: true },
+        }
     }
 
     /// Takes `part` for changed.
@@ -208,8 +228,8 @@ fn project_on<const N: usize>(project: &mut Project, frame: &Frame, values: &Val
     let Frame { mesh, exact, table, view, switches, .. } = frame;
     let (pixels, counts) = project.render(&mesh.geometry, values, exact, *table, view, switches)?;
     let _ = (frame.progress)(1.0);
-    let project::Counts { cells, order_ms, project_ms, draw_ms, fragments } = counts;
-    let stats = ProjectionStats { drawn_cells: cells, order_ms, project_ms, draw_ms, fragments };
+    let project::Counts { cells, order_ms, sorts, project_ms, draw_ms, fragments } = counts;
+    let stats = ProjectionStats { drawn_cells: cells, order_ms, sorts, project_ms, draw_ms, fragments };
     let device_ms = project_ms.zip(draw_ms).map(|(p, d)| p + d);
     Ok(Drawn { pixels, device_ms, projection: Some(stats), ..Drawn::default() })
 }

@@ -1,6 +1,6 @@
 //! The field that is drawn, normalised for the transfer function that it is drawn with.
 
-use super::Loaded;
+use super::loaded::Loaded;
 use crate::error::Result;
 use crate::field::normal::{Chooser, Normal};
 use crate::field::{Field, Kind};

@@ -53,6 +53,8 @@ pub struct ProjectionStats {
     pub drawn_cells: u64,
     /// Finding the cells that are seen and sorting them, in ms; 0 if the camera stood still.
     pub order_ms: f64,
+    /// How often cells were sorted: once, or not at all where the order of the frame before holds.
+    pub sorts: u32,
     /// Projecting them, by the device's own clock, in ms, where it has one.
     pub project_ms: Option<f64>,
     /// Drawing them, likewise.

@@ -32,6 +32,8 @@ const SOLID: [f64; 3] = [0.78, 0.82, 0.88];
 pub struct Wishes {
     /// The scalars that colours and opacities range over.
     pub range: Option<[f64; 2]>,
+    /// Smallest and largest value, where pictures of other meshes, such as those of other time steps, share the range.
+    pub values: Option<[f64; 2]>,
     /// The colours.
     pub map: Option<ColorMap>,
     /// The opacities.

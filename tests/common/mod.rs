@@ -112,7 +112,7 @@ pub(crate) fn on_device(engine: render::Engine) -> Option<Renderer> {
         Ok(renderer) => Some(renderer),
         Err(e) if std::env::var("HALITE_REQUIRE_GPU").is_ok_and(|v| v == "1") => panic!("{e}"),
         Err(e) => {
-            eprintln!("SKIPPED, as there is no device to test: {e}");
+            eprintln!("skipped: there is no device to test: {e}");
             None
         }
     }

@@ -74,7 +74,7 @@ fn roles_of_arrays() {
 fn case(name: &str) -> Option<halite::Result<Mesh>> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/cases").join(name);
     if !path.exists() {
-        eprintln!("skipped: no {}", path.display());
+        eprintln!("skipped in part: there is no {}", path.display());
         return None;
     }
     Some(halite::io::open(&path, &|_| ()))

@@ -353,16 +353,32 @@ fn variants_of_the_projection_engine() {
     assert!(draw("") == draw("--dither") && draw("--dither=false") != draw(""));
     let Ran(code, _, err) = place.run("study dithered.json --out sheet.png --frames 1");
     assert!(code == Some(0) && err.contains("projection"), "{err}");
-    let Ran(code, out, err) = place
-        .run("study cube.vtu --integrals --table 16x16x8 --out forms.png --json forms.json --frames 1 --size 24x16");
+    let Ran(code, out, err) = place.run(
+        "study cube.vtu --integrals --table 64x64x32 --out forms.png --json forms.json --frames 1 --size 24x16 \
+            --opacity 0:0.01,6:0.05 --unit-distance 1",
+    );
     assert_eq!((code, err.as_str()), (Some(0), ""));
     assert!(out.contains("polynomial, degree 2") && out.contains("plane per cell"), "{out}");
     let forms: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(place.path("forms.json")).unwrap()).unwrap();
     let forms = forms["forms"].as_array().unwrap();
     let sizes = forms.iter().map(|f| f["table_bytes"].as_u64().unwrap());
-    assert!(sizes.max() == Some(16 * 16 * 16 * 8));
-    assert!(forms.len() > 30 && forms.iter().all(|f| f["rmse"].as_f64().unwrap() < 0.3), "{forms:?}");
+    assert!(sizes.max() == Some(64 * 64 * 64 * 8));
+    assert!(forms.len() > 30, "{forms:?}");
+    // Of a mean opacity of some hundredths; what is published with fewer planes or entries is farther off.
+    for form in forms {
+        let (name, rmse) = (form["form"].as_str().unwrap(), form["rmse"].as_f64().unwrap());
+        let bound = match name.split(" on ").last().unwrap_or(name) {
+            name if name.contains("linear alpha") => 8e-4,
+            name if name.contains("volume, log") && !name.contains("normalised") => 1.5e-3,
+            name if name.contains("one plane") => 3e-4,
+            name if name.contains("plane per cell") => 6e-5,
+            name if name.contains("cylindrical") => 2e-5,
+            name if name.contains("volume") || name.contains("polynomial") => 6e-6,
+            _ => 1e-6,
+        };
+        assert!(rmse <= bound, "{name}: {rmse:.1e}");
+    }
     let sheet = std::fs::read(place.path("sheet.png")).unwrap();
     assert!(sheet.len() > 1000 && sheet.starts_with(b"\x89PNG"));
 }

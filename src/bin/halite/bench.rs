@@ -1,4 +1,5 @@
-use crate::render::{self, Job, Request, Times, ms};
+use crate::drawn::{self, Times, ms};
+use crate::render::{self, Job, Request};
 use crate::{camera, output, progress};
 use anyhow::{Context, Result};
 use clap::Args;
@@ -80,7 +81,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     output::print(&table(&runs, size))?;
     if let Some(path) = &options.json {
         let report = |r: &Run| {
-            let mut report = render::report(&r.stats, &r.times, size, r.frame_ms);
+            let mut report = drawn::report(&r.stats, &r.times, size, r.frame_ms);
             report["frame_cpu_ms"] = json!(r.frame_cpu_ms);
             report
         };

@@ -1,5 +1,5 @@
-use crate::output;
-use crate::render::{self, Job};
+use crate::render::Job;
+use crate::{drawn, output};
 use anyhow::Result;
 use clap::Args;
 use halite::mesh::{cells::Tetrahedra, generate};
@@ -22,8 +22,8 @@ pub(crate) fn run(options: &Options, renderer: &mut Renderer) -> Result<()> {
     output::check_picture(&options.out)?;
     let job = renderer.install(prepare)?;
     let background = job.scene.background;
-    let drawn = render::draw(job, renderer)?;
-    drawn.image.save(&options.out, render::backdrop(background, None))?;
+    let picture = drawn::draw(job, renderer)?;
+    picture.image.save(&options.out, drawn::backdrop(background, None))?;
     output::print(&format!("{}\n", options.out.display()))
 }
 

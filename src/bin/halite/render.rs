@@ -1,4 +1,6 @@
+use crate::drawn::{backdrop, draw, ms};
 use crate::legend::Legend;
+use crate::steps::{self, Steps};
 use crate::{camera, input, integral, look, output, parse, progress, variant};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
@@ -7,15 +9,13 @@ use halite::cast::{Order, Reconstruction, Sampling};
 use halite::field::{Association, Component, Field, Kind};
 use halite::gpu::DeviceChoice;
 use halite::grid::Grid;
-use halite::image::{Backdrop, Image};
 use halite::integral::choice::{Choice, Form};
 use halite::io::Time;
 use halite::mesh::{Mesh, cells::Tetrahedra};
 use halite::project::Switches;
-use halite::render::{self, Renderer, Stats};
+use halite::render::{self, Renderer};
 use halite::scene::{Scalars, Scene, automatic, missing};
-use halite::transfer::TransferFunction;
-use halite::view::{Blend, Camera, ClippingPlane};
+use halite::view::{Blend, ClippingPlane};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -26,10 +26,10 @@ use std::time::Instant;
 #[derive(Args)]
 pub(crate) struct Options {
     #[command(flatten)]
-    request: Request,
+    pub(crate) request: Request,
     /// The picture: .png (8-bit), .exr or .npy (linear premultiplied RGBA, 32-bit float); - is standard output
     #[arg(short, long, value_name = "FILE|-")]
-    out: PathBuf,
+    pub(crate) out: PathBuf,
     /// What standard output gets [default: png]
     #[arg(long, value_name = "FORMAT", value_parser = ["png", "exr", "npy"])]
     format: Option<String>,
@@ -49,7 +49,7 @@ pub(crate) struct Options {
 pub(crate) struct Request {
     /// The mesh, or the scene that describes it (.json); - is standard input, for either
     #[arg(value_name = "MESH.vtu|SCENE.json|-")]
-    input: PathBuf,
+    pub(crate) input: PathBuf,
     /// The time step: its number from 0, a time such as 2.0, or "last" [default: the first]
     #[arg(long, value_name = "STEP|TIME", value_parser = parse::time, allow_hyphen_values = true)]
     time: Option<Time>,
@@ -173,7 +173,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     let mut renderer = request.renderer(threads, given.as_ref(), request.device(given.as_ref()))?;
     request.check_room(given.as_ref())?;
     let report = if options.all_times {
-        all_times(options, given, &mut renderer)?
+        steps::draw(options, given, &mut renderer)?
     } else {
         let job = renderer.install(|| prepare(request, given))?;
         picture(options, &options.out, job, &mut renderer)?
@@ -185,7 +185,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
 }
 
 /// Draws a picture into a file, and says what it took.
-fn picture(options: &Options, out: &Path, job: Job, renderer: &mut Renderer) -> Result<serde_json::Value> {
+pub(crate) fn picture(options: &Options, out: &Path, job: Job, renderer: &mut Renderer) -> Result<serde_json::Value> {
     let background = job.scene.background;
     let legend = if options.legend { Some(job.legend()?) } else { None };
     let mut drawn = draw(job, renderer)?;
@@ -195,53 +195,6 @@ fn picture(options: &Options, out: &Path, job: Job, renderer: &mut Renderer) -> 
     let format = options.format.as_deref().unwrap_or("png");
     output::picture(&drawn.image, out, format, backdrop(background, drawn.behind.as_deref()))?;
     Ok(drawn.report())
-}
-
-/// Draws all time steps, with the colours, opacities and view of the first over the range of all.
-fn all_times(options: &Options, given: Option<Scene>, renderer: &mut Renderer) -> Result<serde_json::Value> {
-    let request = &options.request;
-    if input::is_standard(&options.out) {
-        return Err(output::misuse("--all-times: standard output takes one picture; --out FILE.png names all of them"));
-    }
-    let path = given.as_ref().map_or(&request.input, |scene| &scene.mesh);
-    let count = input::source(path)?.times().len().max(1);
-    let mut steps = Steps::default();
-    if given.is_none() && request.range.is_none() {
-        steps.range = renderer.install(|| range_of_all(request, count))?;
-    }
-    let mut reports = vec![];
-    for step in 0..count {
-        steps.time = Some(Time::Step(step));
-        let job = renderer.install(|| prepare_step(request, given.clone(), &mut steps))?;
-        reports.push(picture(options, &output::numbered(&options.out, step, count), job, renderer)?);
-    }
-    Ok(reports.into())
-}
-
-/// The range that the values of all time steps have where they are drawn.
-fn range_of_all(request: &Request, count: usize) -> Result<Option<[f64; 2]>> {
-    let (mut all, mut scalars) = (None::<[f64; 2]>, None);
-    for step in 0..count {
-        let (mesh, _) = input::mesh(&request.input, Some(Time::Step(step)))?;
-        let tetrahedra = Tetrahedra::new(&mesh).with_context(|| request.input.display().to_string())?;
-        let scalars = match &scalars {
-            Some(first) => first,
-            None => scalars.insert(request.scalars(None, &mesh)?),
-        };
-        if let Some((range, _)) = automatic::range(&mesh, &tetrahedra, scalars) {
-            all = Some(all.map_or(range, |all| [all[0].min(range[0]), all[1].max(range[1])]));
-        }
-    }
-    Ok(all.map(automatic::widened))
-}
-
-/// What is the same for all time steps, once the first is known.
-#[derive(Default)]
-pub(crate) struct Steps {
-    time: Option<Time>,
-    range: Option<[f64; 2]>,
-    scalars: Option<Scalars>,
-    look: Option<(TransferFunction, Camera)>,
 }
 
 /// Everything that a picture takes, and how long it took to get.
@@ -263,7 +216,8 @@ pub(crate) fn prepare(options: &Request, given: Option<Scene>) -> Result<Job> {
     prepare_step(options, given, &mut Steps { time: options.time, ..Steps::default() })
 }
 
-fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut Steps) -> Result<Job> {
+/// As [`prepare`], of one of several time steps.
+pub(crate) fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut Steps) -> Result<Job> {
     let mut map = options.colormap.as_deref().map(look::color_map).transpose()?;
     let from_file = given.is_some();
     let start = Instant::now();
@@ -312,7 +266,8 @@ fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut Steps) -> R
             let first = automatic::camera(&mesh, &tetrahedra, size);
             let framed = |camera| automatic::framed(&mesh, &tetrahedra, camera, size);
             let wishes = automatic::Wishes {
-                range: options.range.or(steps.range),
+                range: options.range,
+                values: steps.values,
                 map,
                 opacity: options.opacity.clone(),
                 unit_distance: options.unit_distance,
@@ -468,7 +423,7 @@ impl Request {
     }
 
     /// Whether no array is asked for, and there is none to choose.
-    fn has_no_choice(&self, mesh: &Mesh) -> bool {
+    pub(crate) fn has_no_choice(&self, mesh: &Mesh) -> bool {
         let asked = self.scalars.is_some() || self.rgba.is_some() || self.pair.is_some();
         let wanted = asked || self.association.is_some() || self.component.is_some();
         !wanted && mesh.point_arrays().is_empty() && mesh.cell_arrays().is_empty()
@@ -485,7 +440,7 @@ impl Request {
         Ok(())
     }
 
-    fn scalars(&self, scene: Option<&Scene>, mesh: &Mesh) -> Result<Scalars> {
+    pub(crate) fn scalars(&self, scene: Option<&Scene>, mesh: &Mesh) -> Result<Scalars> {
         let association = self.association.map(|a| match a {
             Of::Point => Association::Point,
             Of::Cell => Association::Cell,
@@ -525,82 +480,4 @@ fn check_engine(scene: &Scene) -> Result<()> {
         check::<Engine>("engine", name)?;
     }
     Ok(())
-}
-
-/// A picture, and what it took.
-pub(crate) struct Drawn {
-    pub(crate) image: Image,
-    behind: Option<halite::scene::Backdrop>,
-    stats: Stats,
-    times: Times,
-}
-
-/// What the renderer's own statistics do not tell, in ms.
-#[derive(Default)]
-pub(crate) struct Times {
-    pub(crate) load: f64,
-    pub(crate) split: f64,
-    pub(crate) first_frame: f64,
-    /// From a change of the transfer function to the frame that shows it.
-    pub(crate) transfer_edit: Option<f64>,
-}
-
-pub(crate) fn draw(job: Job, renderer: &mut Renderer) -> Result<Drawn> {
-    let Job { mesh, grid, tetrahedra, field, scene, load_ms, split_ms, .. } = job;
-    let (view, behind) = scene.view()?;
-    match &grid {
-        Some(grid) => renderer.set_grid(grid)?,
-        None => {
-            renderer.check_room(mesh.points().len(), &tetrahedra)?;
-            progress::during("matching faces", |p| renderer.set_mesh_with_progress(&mesh, tetrahedra, p));
-        }
-    }
-    renderer.set_field(&field)?;
-    renderer.set_transfer(&scene.transfer);
-    // The renderer has its own copy, and the meshes that people draw are large.
-    drop((mesh, grid, field));
-    let start = Instant::now();
-    let image = progress::during("drawing", |p| renderer.render(&view, p))?;
-    let times = Times { load: load_ms, split: split_ms, first_frame: ms(start), transfer_edit: None };
-    Ok(Drawn { image, behind, stats: renderer.stats().clone(), times })
-}
-
-impl Drawn {
-    fn report(&self) -> serde_json::Value {
-        report(&self.stats, &self.times, self.image.size, self.stats.frame_ms)
-    }
-}
-
-/// What is told of frames that took `frame_ms`.
-pub(crate) fn report(s: &Stats, times: &Times, size: [u32; 2], frame_ms: f64) -> serde_json::Value {
-    serde_json::json!({
-        "engine": s.engine, "device": s.device, "adapter": s.adapter,
-        "size": size, "cells": s.cells, "tetrahedra": s.tetrahedra,
-        "load_ms": times.load, "faces_ms": times.split + s.faces_ms, "upload_ms": s.upload_ms,
-        "first_frame_ms": times.first_frame, "frame_ms": frame_ms, "transfer_edit_ms": times.transfer_edit,
-        "integral": s.integral, "table_ms": s.table_ms, "table_bytes": s.table_bytes, "knots_per_cell": s.knots_per_cell,
-        "steps": s.steps, "repaired_rays": s.repaired_rays, "cpu_rays": s.cpu_rays,
-        "device_ms": s.device_ms, "uploaded_bytes": s.uploaded_bytes, "device_bytes": s.device_bytes,
-        "peak_bytes": peak_bytes(), "projection": s.projection, "sweep": s.sweep,
-    })
-}
-
-/// The most memory that this process ever held, where the system says so.
-fn peak_bytes() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
-    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kb| kb * 1024)
-}
-
-/// What an 8-bit picture shows behind the volume: opaque objects, if there are any.
-pub(crate) fn backdrop(background: Option<[f64; 3]>, behind: Option<&[[f32; 3]]>) -> Backdrop<'_> {
-    match (behind, background) {
-        (Some(pixels), _) => Backdrop::Pixels(pixels),
-        (None, Some(c)) => Backdrop::Color(c.map(|c| c as f32)),
-        (None, None) => Backdrop::Transparent,
-    }
-}
-
-pub(crate) fn ms(start: Instant) -> f64 {
-    start.elapsed().as_secs_f64() * 1e3
 }

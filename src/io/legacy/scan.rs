@@ -1,7 +1,9 @@
 //! The words and arrays of a legacy file, one after another: text or binary, as its third line says.
 
+use crate::error::Error;
 use crate::io::data::reverse;
 use crate::io::number::{Kind, Number, with_kind};
+use crate::memory;
 use crate::mesh::Values;
 
 /// Why a file cannot be read; the place is added to it.
@@ -14,6 +16,8 @@ pub(super) struct Scanner<'a> {
     /// The byte that lines end with: the last of two, or that of old Macs.
     end: u8,
     pub(super) binary: bool,
+    /// What there was no memory for: then nothing of the file is of use.
+    pub(super) lacking: Option<Error>,
 }
 
 /// The keywords that sections start with, and what follows them on the line: words, counts (`n`) and types (`t`).
@@ -91,7 +95,7 @@ impl<'a> Scanner<'a> {
         let at = bom + bytes[bom..].iter().take_while(|b| b.is_ascii_whitespace()).count();
         let mut first = bytes[at..].iter().skip_while(|b| !matches!(b, b'\n' | b'\r'));
         let old_mac = first.next() == Some(&b'\r') && first.next() != Some(&b'\n');
-        Scanner { bytes, at, end: if old_mac { b'\r' } else { b'\n' }, binary: false }
+        Scanner { bytes, at, end: if old_mac { b'\r' } else { b'\n' }, binary: false, lacking: None }
     }
 
     /// Bytes from the start of the file.
@@ -282,9 +286,14 @@ impl<'a> Scanner<'a> {
             Type::Numbers { stored, kept } if stored == kept => {
                 Some(with_kind!(kept, T => T::values(self.numbers::<T>(count)?)))
             }
-            Type::Numbers { .. } => Some(Values::I64(self.numbers::<i32>(count)?.into_iter().map(i64::from).collect())),
+            Type::Numbers { .. } => {
+                let narrow = self.numbers::<i32>(count)?;
+                self.had(memory::check_array::<i64>("an array", count))?;
+                Some(Values::I64(narrow.into_iter().map(i64::from).collect()))
+            }
             Type::Bits if self.binary => {
                 let bytes = self.take(count.div_ceil(8))?;
+                self.had(memory::check_array::<u8>("an array", count))?;
                 Some(Values::U8((0..count).map(|i| bytes[i / 8] >> (7 - i % 8) & 1).collect()))
             }
             Type::Bits => Some(Values::U8(self.numbers(count)?)),
@@ -341,11 +350,20 @@ impl<'a> Scanner<'a> {
         Ok(taken)
     }
 
+    /// What was asked of the memory, with a lack of it as any other fault.
+    pub(super) fn had<T>(&mut self, answer: crate::Result<T>) -> Result<T, Fault> {
+        answer.map_err(|error| {
+            let what = error.to_string();
+            self.lacking = Some(error);
+            what
+        })
+    }
+
     /// The next numbers. Those of binary files have their highest byte first.
     pub(super) fn numbers<T: Number>(&mut self, count: usize) -> Result<Vec<T>, Fault> {
         if self.binary {
             let bytes = self.take(count.saturating_mul(size_of::<T>()))?;
-            let mut numbers = vec![T::zeroed(); count];
+            let mut numbers: Vec<T> = self.had(memory::zeroed("an array", count))?;
             let own = bytemuck::cast_slice_mut(&mut numbers);
             own.copy_from_slice(bytes);
             if cfg!(target_endian = "little") {
@@ -354,7 +372,9 @@ impl<'a> Scanner<'a> {
             return Ok(numbers);
         }
         // Each takes two bytes at least: what the file says is not taken for it.
-        let mut numbers = Vec::with_capacity(count.min(self.rest().len() / 2 + 1));
+        let mut numbers = Vec::new();
+        let most = count.min(self.rest().len() / 2 + 1);
+        self.had(memory::reserve("an array", &mut numbers, most))?;
         while numbers.len() < count {
             let token = self.bytes_of_word();
             let token = token.ok_or_else(|| format!("it holds {} numbers, not {count}", numbers.len()))?;

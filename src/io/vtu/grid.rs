@@ -6,10 +6,12 @@ use crate::error::{Error, Result};
 use crate::io::data::{DataArray, Store};
 use crate::io::number::{Number, with_kind};
 use crate::io::{Progress, validated};
+use crate::memory;
 use crate::mesh::{Array, LeftOut, Mesh};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::{BTreeSet, HashMap};
+use std::fmt::Display;
 use std::path::Path;
 
 /// A grid whose head has been read.
@@ -68,7 +70,9 @@ impl Grid<'_> {
             }
         };
         let parts = self.pieces.par_iter().enumerate().map(read).collect::<Result<Vec<_>>>()?;
-        Ok(joined(parts).par_chunks_exact(3).map(DVec3::from_slice).collect())
+        let numbers = joined("its points", parts)?;
+        memory::check_array::<f64>("its points", numbers.len())?;
+        Ok(numbers.par_chunks_exact(3).map(DVec3::from_slice).collect())
     }
 
     /// Reads indices of any number type, all that there are or so many. `check` turns each into what is kept, or
@@ -112,7 +116,9 @@ impl Grid<'_> {
     /// Reads bits, the highest of a byte first, as 0 and 1; numbers of another type as what a byte holds of them.
     fn bits(&self, piece: &Piece, array: &DataArray, tuples: u64) -> Result<Vec<u8>> {
         if !array.bits {
-            return Ok(self.floats(piece, array, tuples)?.into_iter().map(|x| x as u8).collect());
+            let floats = self.floats(piece, array, tuples)?;
+            memory::check_array::<u8>(array, floats.len())?;
+            return Ok(floats.into_iter().map(|x| x as u8).collect());
         }
         let count = tuples.saturating_mul(array.components as u64);
         let bytes: Vec<u8> =
@@ -120,6 +126,7 @@ impl Grid<'_> {
                 out.copy_from_slice(numbers);
                 Ok(())
             })?;
+        memory::check_array::<u8>(array, count as usize)?;
         Ok((0..count as usize).map(|i| bytes[i / 8] >> (7 - i % 8) & 1).collect::<Vec<u8>>())
     }
 
@@ -172,7 +179,7 @@ impl Grid<'_> {
         };
         let values = if parts.iter().any(|(_, part)| part.bits) {
             let bits = parts.iter().map(|(piece, part)| self.bits(piece, part, piece.tuples(section)));
-            u8::values(joined(bits.collect::<Result<Vec<_>>>()?))
+            u8::values(joined(first, bits.collect::<Result<Vec<_>>>()?)?)
         } else if parts.iter().all(|(_, part)| part.kind == first.kind) {
             with_kind!(first.kind, T => {
                 let read = |(piece, part): &(&Piece, &DataArray)| {
@@ -182,7 +189,7 @@ impl Grid<'_> {
                         Ok(())
                     })
                 };
-                T::values(joined(parts.iter().map(read).collect::<Result<Vec<_>>>()?))
+                T::values(joined(first, parts.iter().map(read).collect::<Result<Vec<_>>>()?)?)
             })
         } else {
             let (path, name) = (self.path.display(), &first.name);
@@ -191,7 +198,7 @@ impl Grid<'_> {
                 first.section
             );
             let floats = parts.iter().map(|(piece, part)| self.floats(piece, part, piece.tuples(section)));
-            f64::values(joined(floats.collect::<Result<Vec<_>>>()?))
+            f64::values(joined(first, floats.collect::<Result<Vec<_>>>()?)?)
         };
         Ok(Array { name: first.name.clone(), components: first.components, values })
     }
@@ -210,6 +217,12 @@ fn keyed(arrays: &[DataArray]) -> impl Iterator<Item = (Key<'_>, &DataArray)> {
 }
 
 /// One vector of several, without a copy if there is only one.
-pub(super) fn joined<T: Copy>(mut parts: Vec<Vec<T>>) -> Vec<T> {
-    if parts.len() == 1 { parts.swap_remove(0) } else { parts.concat() }
+pub(super) fn joined<T: Copy>(what: impl Display, mut parts: Vec<Vec<T>>) -> Result<Vec<T>> {
+    if parts.len() == 1 {
+        return Ok(parts.swap_remove(0));
+    }
+    let mut all = Vec::new();
+    memory::reserve(what, &mut all, parts.iter().map(Vec::len).sum())?;
+    parts.iter().for_each(|part| all.extend_from_slice(part));
+    Ok(all)
 }

@@ -189,7 +189,7 @@ impl Head {
             lattice: Lattice::default(),
             whole: None,
         };
-        let inner = BufReader::with_capacity((length as usize).clamp(1 << 10, 1 << 18), file);
+        let inner = BufReader::with_capacity((length as usize).clamp(1 << 10, 1 << 16), file);
         let mut reader = Reader::from_reader(Limited { inner, left: MOST_OF_A_TAG });
         let mut buffer = Vec::new();
         loop {
@@ -424,8 +424,8 @@ impl Head {
 }
 
 /// Bytes that a tag or comment may have. It is kept in memory as a whole: without its end, that would be the rest of
-/// the file.
-const MOST_OF_A_TAG: usize = 1 << 20;
+/// the file. A little less than a power of two, to which the place for it grows.
+const MOST_OF_A_TAG: usize = (1 << 18) - (1 << 10);
 
 /// A file of which so many bytes may be taken.
 struct Limited {

@@ -5,6 +5,7 @@ use super::head::Piece;
 use crate::error::Result;
 use crate::io::data::DataArray;
 use crate::io::number::{Number, with_kind};
+use crate::memory;
 use crate::mesh::{Cells, POLYHEDRON, Polyhedra};
 use rayon::prelude::*;
 
@@ -32,11 +33,11 @@ impl Grid<'_> {
             let n = cells.types.len();
             types.push(cells.types);
             connectivity.push(cells.connectivity);
-            append(&mut offsets, cells.offsets);
+            append(&mut offsets, cells.offsets)?;
             if has_polyhedra {
                 let polyhedra = polyhedra.unwrap_or_default();
-                append(&mut of_cells, if polyhedra.cells.is_empty() { vec![0; n] } else { polyhedra.cells });
-                append(&mut faces, polyhedra.faces);
+                append(&mut of_cells, if polyhedra.cells.is_empty() { vec![0; n] } else { polyhedra.cells })?;
+                append(&mut faces, polyhedra.faces)?;
                 points.push(polyhedra.points);
             }
         }
@@ -46,8 +47,10 @@ impl Grid<'_> {
             }
             list
         };
-        let polyhedra = Polyhedra { cells: closed(of_cells), faces: closed(faces), points: joined(points) };
-        let cells = Cells { types: joined(types), offsets: closed(offsets), connectivity: joined(connectivity) };
+        let points = joined("the faces of its polyhedra", points)?;
+        let polyhedra = Polyhedra { cells: closed(of_cells), faces: closed(faces), points };
+        let (types, connectivity) = (joined("the types of its cells", types)?, joined("its cells", connectivity)?);
+        let cells = Cells { types, offsets: closed(offsets), connectivity };
         Ok(Topology { cells, polyhedra: has_polyhedra.then_some(polyhedra) })
     }
 
@@ -112,7 +115,8 @@ impl Grid<'_> {
         if !fits(&cells, lists.len()) || !fits(&ends, points.len()) {
             return Err(self.malformed(piece, "the lists of the polyhedra's faces do not fit together"));
         }
-        let mut polyhedra = Polyhedra::default();
+        // As many as lists of two cells to a face have.
+        let mut polyhedra = room(2 * points.len(), lists.len(), cells.len())?;
         let mut start = 0;
         for (cell, end) in cells.iter().enumerate() {
             for face in &lists[start as usize..*end as usize] {
@@ -148,7 +152,7 @@ impl Grid<'_> {
         let ends = self.signed(piece, ends, piece.cells)?;
         let stream = self.indices(piece, stream, None, Some, no_index)?;
         let numbered = piece.numbered_from(base);
-        let mut polyhedra = Polyhedra::default();
+        let mut polyhedra = room(stream.len(), stream.len() / 4, ends.len())?;
         let mut at = 0;
         for (cell, end) in ends.iter().enumerate() {
             if let (Ok(end), true) = (usize::try_from(*end), types[cell] == POLYHEDRON) {
@@ -198,19 +202,33 @@ impl Piece {
     }
 }
 
+/// Empty lists, with room for so many points of faces, faces and cells.
+fn room(points: usize, faces: usize, cells: usize) -> Result<Polyhedra> {
+    let mut polyhedra = Polyhedra::default();
+    let what = "the faces of its polyhedra";
+    memory::reserve(what, &mut polyhedra.points, points)?;
+    memory::reserve(what, &mut polyhedra.faces, faces)?;
+    memory::reserve(what, &mut polyhedra.cells, cells)?;
+    Ok(polyhedra)
+}
+
 fn no_index(_: usize, _: Option<u64>) -> String {
     "an entry is not a whole number from 0 up".to_owned()
 }
 
 /// Appends the ends of lists to those before them, which start with 0.
-fn append(all: &mut Vec<u64>, ends: Vec<u64>) {
+fn append(all: &mut Vec<u64>, ends: Vec<u64>) -> Result<()> {
+    let what = "the ends of its cells";
     if all.is_empty() {
         *all = ends;
+        memory::reserve(what, all, 1)?;
         all.insert(0, 0);
     } else {
         let base = all.last().copied().unwrap_or_default();
+        memory::reserve(what, all, ends.len())?;
         all.extend(ends.iter().map(|end| base.saturating_add(*end)));
     }
+    Ok(())
 }
 
 /// Hexahedra of these VTK types had, before VTK 9, the third and fourth of their upright edges the other way round.

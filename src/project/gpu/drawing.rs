@@ -1,12 +1,12 @@
 //! Projecting and drawing the batches of a frame.
 
+use super::record::Layout;
 use super::{BATCH, Pass, Project, Slice, groups_of, unprepared};
 use crate::error::Result;
 use crate::gpu::buffers::Buffer;
 use crate::gpu::clock::{CLOCKS, Clock};
 use crate::gpu::raster::{Readback, Texture};
 use crate::project::Counts;
-use crate::project::record::Layout;
 use crate::view::View;
 use std::time::Instant;
 use wgpu::{BufferUsages as Usage, TextureUsages};

@@ -1,5 +1,8 @@
 //! Which cells are seen, and in which order they are drawn.
 
+use super::frame::{Frame, Seen};
+use super::keys::{self, Parts};
+use super::lines::Lines;
 use super::{BATCH, Pass, Project, Slice, groups_of, unprepared};
 use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Values};
@@ -7,9 +10,6 @@ use crate::gpu::buffers::Buffer;
 use crate::gpu::sort::Sorter;
 use crate::order::PART;
 use crate::order::depth::{self, HIDDEN};
-use crate::project::frame::{Frame, Seen};
-use crate::project::keys::{self, Parts};
-use crate::project::lines::Lines;
 use crate::project::{Order, Switches};
 use rayon::prelude::*;
 use wgpu::BufferUsages as Usage;

@@ -1,6 +1,9 @@
 //! What the programs are compiled from, and for.
 
 use super::Project;
+use super::frame::{GROWTH, Limits};
+use super::lines::{BINS, LINES_ACROSS};
+use super::record::Layout;
 use crate::error::Result;
 use crate::gpu::arrays;
 use crate::gpu::raster::{self, Slot};
@@ -10,9 +13,6 @@ use crate::gpu::table::{self, TABLE};
 use crate::integral::Lookup;
 use crate::order::PART;
 use crate::order::depth::HIDDEN;
-use crate::project::frame::{GROWTH, Limits};
-use crate::project::lines::{BINS, LINES_ACROSS};
-use crate::project::record::Layout;
 use crate::project::{Compositing, Fragments, Switches, Thickness};
 use wgpu::ShaderStages as Stages;
 

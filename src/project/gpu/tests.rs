@@ -9,7 +9,7 @@ use crate::integral::lookup::tests::{choices, exact};
 use crate::mesh::{cells::Tetrahedra, generate};
 use crate::order::MOST_PARTS;
 use crate::order::depth::{self, HIDDEN};
-use crate::project::frame::{Frame, Limits};
+use crate::project::gpu::frame::{Frame, Limits};
 use crate::project::{Compositing, Order};
 use crate::render::{Engine, Renderer};
 use crate::transfer::{Emission, TransferFunction};
@@ -226,7 +226,7 @@ fn a_lost_device_is_survived() {
 fn ten_million_tetrahedra_are_drawn() {
     let Some(gpu) = gpu() else { return };
     if std::env::var_os("HALITE_LONG").is_none() {
-        eprintln!("not run: HALITE_LONG is not set");
+        eprintln!("skipped: it takes minutes, HALITE_LONG=1 runs it");
         return;
     }
     let [(mut project, view), (mut traverse, _)] =

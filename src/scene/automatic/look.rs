@@ -120,6 +120,8 @@ impl Sample {
     /// none.
     fn positive_range(&self, [lo, hi]: [f64; 2]) -> Option<[f64; 2]> {
         let least = self.places.iter().map(|p| p.color).filter(|&v| v > 0.0).fold(f64::INFINITY, f64::min);
+        // Of several meshes, this one may have no value above 0.
+        let least = if least.is_finite() { least } else { 0.0 };
         let (least, hi) = if lo > 0.0 { (lo, hi) } else { (least, hi) };
         let lo = least.max(hi * 0.1_f64.powi(DECADES));
         if hi > 0.0 && lo < hi {
@@ -226,7 +228,8 @@ pub(super) fn transfer(
     let (mut range, note) = match wishes.range {
         Some(range) => (range, "as asked for".to_owned()),
         None => {
-            let found = super::range(mesh, tetrahedra, scalars);
+            let shared = wishes.values.map(|values| (values, "the values of all time steps".to_owned()));
+            let found = shared.or_else(|| super::range(mesh, tetrahedra, scalars));
             let (found, note) = found.unwrap_or_else(|| (all, "the values of the array".to_owned()));
             let positive = if wishes.logarithmic { sample.positive_range(found) } else { None };
             (positive.unwrap_or_else(|| widened(found)), note)

@@ -15,7 +15,7 @@ use crate::order::MOST_PARTS;
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
-const STRAIGHT: &str = include_str!("../../shaders/project_straight.wgsl");
+const STRAIGHT: &str = include_str!("../../../shaders/project_straight.wgsl");
 
 /// Optical depth of the longest segment up to which fragments go straight, and up to which they take slight pieces of a
 /// series that is short.

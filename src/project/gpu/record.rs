@@ -6,8 +6,8 @@
 //! that nobody looks at. Vertex fetch is much faster than look-ups in a storage buffer where drivers do these lane by
 //! lane.
 
-use super::Fragments;
 use super::lines::Lines;
+use crate::project::Fragments;
 
 /// The words of a form before its lines, and how many values there are.
 const INTERSECTED: (usize, usize) = (6, 6);

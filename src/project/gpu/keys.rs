@@ -5,11 +5,11 @@
 
 use super::frame::{GROWTH, Seen};
 use super::lines::{self, BINS, Lines};
-use super::{Fragments, Order, Switches};
 use crate::geometry::{Cell, Geometry, Values};
 use crate::gpu::rays::FAR;
 use crate::order::MOST_PARTS;
 use crate::order::depth::HIDDEN;
+use crate::project::{Fragments, Order, Switches};
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
