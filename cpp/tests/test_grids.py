@@ -7,8 +7,11 @@ from vtkmodules.util import numpy_support
 from scene import Errors, add, check, look, main, pixels, renderer, scene, transform, truth, volume, window
 
 SIZE = (4, 3, 5)
+# Pixels, and parts of a ray that count as one value.
+WINDOW, STEPS = (32, 32), 600
 RAMP = [(0, 0.1, 0.3, 1), (0.5, 0.9, 0.9, 0.2), (1, 1, 0.2, 0.1)]
 LOW = [(0, 0.0), (0.3, 0.5), (0.6, 0.1), (1, 0.8)]
+LOOK = {"opacity": LOW, "color": RAMP, "slab": True, "unit": 0.5, "steps": STEPS}
 VALUES = np.random.default_rng(5).uniform(0, 1, SIZE[::-1])
 AXES = [np.array([-0.2, 0.1, 0.7, 1.0]), np.array([0.0, 0.35, 1.1]), np.array([0.0, 0.2, 0.5, 0.8, 1.3])]
 
@@ -65,9 +68,9 @@ def in_cells(axes, values):
 def expect(v, axes, field, linear=True, near=1.5, **settings):
     if linear:
         v.GetProperty().SetInterpolationTypeToLinear()
-    w, r = scene(v, position=(2.4, -2.1, 3.0))
+    w, r = scene(v, size=WINDOW, position=(2.4, -2.1, 3.0))
     box = {"low": [a[0] for a in axes], "high": [a[-1] for a in axes]}
-    expected = truth(r, (64, 64), **box, field=field, **{"opacity": LOW, "color": RAMP, "slab": True, "unit": 0.5, "steps": 3000, **settings})
+    expected = truth(r, WINDOW, **box, field=field, **{**LOOK, **settings})
     check(pixels(w), expected, near=near)
     return w, r
 
@@ -82,7 +85,8 @@ def test_images():
     expect(v, axes, trilinear(axes), slab=False)
     v = volume(image(), LOW, RAMP, 0.5)
     v.GetMapper().SetBlendModeToMaximumIntensity()
-    expect(v, axes, trilinear(axes), maximum=True)
+    # The largest of some values is below the largest of all.
+    expect(v, axes, trilinear(axes), maximum=True, steps=6000)
 
 
 def test_nearest_is_the_default_of_images():
@@ -110,7 +114,7 @@ def test_placement():
     moved = np.array([[1, 0, 0, 0.2], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
     v.SetUserMatrix(transform(moved))
     box = {"low": [a[0] for a in AXES], "high": [a[-1] for a in AXES]}
-    check(pixels(w), truth(r, (64, 64), **box, field=trilinear(AXES), opacity=LOW, color=RAMP, slab=True, unit=0.5, matrix=moved, steps=3000))
+    check(pixels(w), truth(r, WINDOW, **box, field=trilinear(AXES), matrix=moved, **LOOK))
 
 
 def test_directions():
@@ -134,8 +138,8 @@ def test_structured_grids():
     p.SetData(numpy_support.numpy_to_vtk(points @ shear[:3, :3].T, deep=1))
     g.SetPoints(p)
     add(g, points @ [0.5, 0.2, 0.3])
-    w, r = scene(volume(g, LOW, RAMP, 0.5), position=(2.4, -2.1, 3.0))
-    check(pixels(w), truth(r, (64, 64), field=lambda p: p @ [0.5, 0.2, 0.3], opacity=LOW, color=RAMP, unit=0.5, matrix=shear))
+    w, r = scene(volume(g, LOW, RAMP, 0.5), size=WINDOW, position=(2.4, -2.1, 3.0))
+    check(pixels(w), truth(r, WINDOW, field=lambda p: p @ [0.5, 0.2, 0.3], opacity=LOW, color=RAMP, unit=0.5, matrix=shear))
 
 
 def test_hidden_cells():
@@ -177,7 +181,7 @@ def test_volumes_of_images_keep_working():
     pictures = []
     for mapper in (theirs, ours):
         v.SetMapper(mapper)
-        w = window()
+        w = window(WINDOW)
         look(renderer(w, v), position=(2.4, -2.1, 3.0))
         pictures.append(pixels(w))
     assert pictures[1].max() > 60
