@@ -6,8 +6,8 @@ use halite::integral::table::{SecondOrder, SecondOrderPolynomial, parabola};
 use rayon::prelude::*;
 use std::time::Instant;
 
-/// Texels along each axis: of tables of one length, and of those of all.
-const VALUES: [u32; 2] = [128, 64];
+/// The most texels along each axis: of tables of one length, and of those of all.
+const MOST: [u32; 2] = [128, 64];
 
 /// Steps of the published construction.
 const ITERATIONS: [(&str, u32); 3] = [("8 steps", 8), ("64 steps", 64), ("256 steps", 256)];
@@ -17,9 +17,9 @@ const DEGREES: [(&str, u32); 2] = [("second order, degree 1", 1), ("second order
 /// A slab: its samples and its length.
 type Slab = ([f64; 3], f64);
 
-/// The tables that were built, and their errors over `count` slabs.
-pub(super) fn rows(exact: &Exact<f64>, longest: f64, count: u32) -> Vec<Row> {
-    let [n, m] = VALUES;
+/// The tables that were built, with so many `values` along each axis at most, and their errors over `count` slabs.
+pub(super) fn rows(exact: &Exact<f64>, longest: f64, values: u32, count: u32) -> Vec<Row> {
+    let [n, m] = MOST.map(|most| most.min(values));
     let mut rows = vec![];
     let of_one = slabs(exact, count, |_| longest);
     for (construction, iterations) in ITERATIONS {
