@@ -35,6 +35,11 @@ impl Frame {
         Frame { origin, across: [a, b], along }
     }
 
+    /// The ray's origin and direction.
+    pub fn ray(&self) -> (DVec3, DVec3) {
+        (self.origin, self.along)
+    }
+
     /// The same ray, moved sideways by `(x, y)`.
     pub fn shifted(self, x: f64, y: f64) -> Self {
         Frame { origin: self.origin + self.across[0] * x + self.across[1] * y, ..self }

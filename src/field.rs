@@ -1,9 +1,12 @@
 //! The field that is drawn: one array of a mesh, reduced to a scalar, a (colour, opacity) pair or RGBA.
 
+pub mod gradient;
+pub mod histogram;
 pub(crate) mod normal;
 
 use crate::error::{Error, Result};
 use crate::mesh::{Array, Arrays, Values, with_values};
+pub use gradient::Gradient;
 pub use normal::Normal;
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -62,6 +65,7 @@ pub struct Field {
     values: Arc<Values>,
     normal: [Normal; 4],
     range: [[f64; 2]; 4],
+    second: Option<Arc<Field>>,
 }
 
 impl Field {
@@ -166,7 +170,34 @@ impl Field {
             Component::All => T::values(numbers.to_vec()),
             Component::Magnitude => Values::F64((0..tuples).into_par_iter().map(|t| value(t, 0)).collect()),
         };
-        Ok(Field { association, kind, values: Arc::new(values), normal, range })
+        Ok(Field { association, kind, values: Arc::new(values), normal, range, second: None })
+    }
+
+    /// The field, with `second` as the second variable in the place of its gradient's length.
+    ///
+    /// # Errors
+    /// [`Error::Field`] unless both have one value for each of the same points, or cells.
+    pub fn with_second(mut self, second: Field) -> Result<Self> {
+        let place = |of: &Field| if of.association == Association::Point { "points" } else { "cells" };
+        if self.kind != Kind::Scalar || second.kind != Kind::Scalar {
+            return Err(Error::Field("a field and its second variable have one value each".into()));
+        }
+        if self.association != second.association || self.len() != second.len() {
+            let (own, other) = (place(&self), place(&second));
+            let what = format!(
+                "the second variable has {} values of {other}, the field {} of {own}: both must be of the same",
+                second.len(),
+                self.len()
+            );
+            return Err(Error::Field(what));
+        }
+        self.second = Some(Arc::new(second));
+        Ok(self)
+    }
+
+    /// The field that is the second variable, if it is not the gradient's length.
+    pub fn second(&self) -> Option<&Field> {
+        self.second.as_deref()
     }
 
     /// Whether the values belong to points or to cells.
@@ -182,6 +213,11 @@ impl Field {
     /// How many values there are: [`Kind::components`] for each point or cell.
     pub fn len(&self) -> usize {
         self.values.len()
+    }
+
+    /// Whether f32 holds each value exactly.
+    pub(crate) fn is_short(&self) -> bool {
+        matches!(*self.values, Values::F32(_) | Values::I8(_) | Values::U8(_) | Values::I16(_) | Values::U16(_))
     }
 
     /// Whether there is no value.

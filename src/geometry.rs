@@ -99,6 +99,40 @@ impl Geometry {
         Self::new(points, tetrahedra, &Faces { neighbours, ..Faces::default() })
     }
 
+    /// Finds the neighbours of cells and the boundary of what [`Self::unconnected`] made, as it is now.
+    pub(crate) fn connect(&mut self) {
+        let mut corners: Vec<[u32; 4]> = self.cells.par_iter().map(|c| c.corners).collect();
+        let faces = Faces::new(&self.points, &corners);
+        // Points whose positions were rounded to one are one.
+        if let Some(weld) = &faces.weld {
+            corners.par_iter_mut().for_each(|c| *c = c.map(|p| weld[p as usize]));
+        }
+        let cells = self.cells.par_iter_mut().zip(&corners).zip(&faces.neighbours);
+        cells.for_each(|((cell, corners), neighbours)| *cell = Cell { corners: *corners, neighbours: *neighbours });
+        let boundary = faces
+            .boundary
+            .par_iter()
+            .map(|&(t, k)| boundary::BoundaryFace { points: faces.outward(&corners, (t, k)), cell: t })
+            .collect();
+        self.boundary = Boundary::new(&self.points, boundary);
+    }
+
+    /// The positions of the points of the mesh and those that its split added, so many, normalised: as far as cells use
+    /// them, else NaN.
+    pub(crate) fn points_of_mesh(&self, tetrahedra: &Tetrahedra, count: usize) -> Vec<DVec3> {
+        let mut points = vec![DVec3::NAN; count];
+        if !self.welded {
+            self.point_of.iter().zip(&self.points).for_each(|(&p, &at)| points[p as usize] = at);
+            return points;
+        }
+        for (cell, &t) in self.cells.iter().zip(&self.tetrahedron_of) {
+            for (own, p) in cell.corners.iter().zip(tetrahedra.corners[t as usize]) {
+                points[p as usize] = self.points[*own as usize];
+            }
+        }
+        points
+    }
+
     /// Moves the points: `points` are as many as before, in world coordinates. Cells keep their neighbours, so none may
     /// turn inside out, and points that shared a position still must.
     pub fn set_points(&mut self, points: &[DVec3]) {
@@ -188,17 +222,33 @@ impl<const N: usize> Values<N> {
             std::array::from_fn(|k| if N == 4 && k < 3 { normal::MOST_COLOUR } else { normal::MOST });
         let brought = |value: &dyn Fn(usize) -> f64| std::array::from_fn(|k| normal[k].bounded(value(k), limits[k]));
         if field.association() == Association::Cell {
-            let cell = |t: u32| tetrahedra.cell.as_ref().map_or(t, |c| c[t as usize]) as usize;
-            let value = |&t: &u32| brought(&|k| field.value(cell(t) * N + k));
-            return Ok(Values::Cell(geometry.tetrahedron_of.par_iter().map(value).collect()));
+            return Ok(Self::of_cells(geometry, tetrahedra, |c| brought(&|k| field.value(c * N + k))));
         }
         let added = tetrahedra.added_values(N, |i| field.value(i));
-        let value = |i: u32| {
+        Ok(Self::of_points(geometry, tetrahedra, |i: u32| {
             let first = i as usize * N;
             brought(&|k| first.checked_sub(count * N).map_or_else(|| field.value(first + k), |i| added[i + k]))
-        };
+        }))
+    }
+
+    /// The values of the cells of the mesh, in the order of `geometry`, made from `tetrahedra`.
+    pub(crate) fn of_cells(
+        geometry: &Geometry,
+        tetrahedra: &Tetrahedra,
+        value: impl Fn(usize) -> [f32; N] + Sync,
+    ) -> Self {
+        let cell = |t: u32| tetrahedra.cell.as_ref().map_or(t, |c| c[t as usize]) as usize;
+        Values::Cell(geometry.tetrahedron_of.par_iter().map(|&t| value(cell(t))).collect())
+    }
+
+    /// The values of the points of the mesh and those that its split added, likewise.
+    pub(crate) fn of_points(
+        geometry: &Geometry,
+        tetrahedra: &Tetrahedra,
+        value: impl Fn(u32) -> [f32; N] + Sync,
+    ) -> Self {
         let at_points: Vec<[f32; N]> = geometry.point_of.par_iter().map(|&p| value(p)).collect();
-        let own = |t: u32| tetrahedra.corners[t as usize].map(value);
+        let own = |t: u32| tetrahedra.corners[t as usize].map(&value);
         let bits = |v: [f32; N]| v.map(f32::to_bits);
         let continuous = !geometry.welded
             || geometry.cells.par_iter().zip(&geometry.tetrahedron_of).all(|(cell, &t)| {
@@ -206,9 +256,9 @@ impl<const N: usize> Values<N> {
                 (0..4).all(|k| bits(at_points[cell.corners[k] as usize]) == bits(own[k]))
             });
         if continuous {
-            return Ok(Values::Point(at_points));
+            return Values::Point(at_points);
         }
-        Ok(Values::Corner(geometry.tetrahedron_of.par_iter().map(|&t| own(t)).collect()))
+        Values::Corner(geometry.tetrahedron_of.par_iter().map(|&t| own(t)).collect())
     }
 
     /// Bytes held.

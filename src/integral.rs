@@ -18,6 +18,7 @@ pub mod choice;
 pub(crate) mod cubic;
 mod knots;
 pub mod lookup;
+pub(crate) mod second;
 pub mod table;
 #[cfg(test)]
 mod tests;

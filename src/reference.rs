@@ -4,8 +4,10 @@
 //! knots numerically: ∫ c τ exp(−∫τ) by Gauss–Legendre with halving, to about 1e-10.
 
 mod grid;
+mod second;
 
 pub use grid::render_grid;
+pub use second::segment_of_two;
 
 use crate::error::{Error, Result};
 use crate::field::{Association, Field, Kind};
@@ -42,14 +44,26 @@ pub struct Reference<'a> {
     /// Middle of the bounds, which coordinates are relative to, and half their diagonal.
     centre: DVec3,
     extent: f64,
+    /// The greatest length of a gradient.
+    steepest: f64,
 }
+
+/// Components of a sample: those of the field; or the scalar, the second variable and the gradient.
+const COMPONENTS: usize = 5;
 
 /// What a segment of `length` world units emits and absorbs, premultiplied RGBA, whose field of one component, in the
 /// array's own units, is linear from `front`, where the ray enters, to `back`.
 pub fn segment(transfer: &TransferFunction, front: f64, back: f64, length: f64) -> [f64; 4] {
-    let alone =
-        Reference { transfer, kind: Kind::Scalar, cells: vec![], boxes: None, centre: DVec3::ZERO, extent: 0.0 };
-    let interval = Interval { t: [0.0, length], values: [front, back].map(|s| [s, 0.0, 0.0, 0.0]) };
+    let alone = Reference {
+        transfer,
+        kind: Kind::Scalar,
+        cells: vec![],
+        boxes: None,
+        centre: DVec3::ZERO,
+        extent: 0.0,
+        steepest: 0.0,
+    };
+    let interval = Interval { t: [0.0, length], values: [front, back].map(|s| [s, 0.0, 0.0, 0.0, 0.0]) };
     alone.composite(std::iter::once(interval))
 }
 
@@ -58,7 +72,7 @@ pub fn segment(transfer: &TransferFunction, front: f64, back: f64, length: f64) 
 struct Tetrahedron {
     corners: [DVec3; 4],
     /// The field's components at each corner, in the array's own units.
-    values: [[f64; 4]; 4],
+    values: [[f64; COMPONENTS]; 4],
     /// A sphere around it.
     centre: DVec3,
     radius: f64,
@@ -68,7 +82,7 @@ struct Tetrahedron {
 struct Interval {
     t: [f64; 2],
     /// The field's components at both ends.
-    values: [[f64; 4]; 2],
+    values: [[f64; COMPONENTS]; 2],
 }
 
 /// What a ray has gathered: emitted light and transmittance.
@@ -97,6 +111,14 @@ impl<'a> Reference<'a> {
                 Association::Cell => of_mesh,
             },
         );
+        let second = field.second().map(|f| match f.association() {
+            Association::Point => tetrahedra.values(f.values(), 1).into_owned(),
+            Association::Cell => f.values().into_owned(),
+        });
+        let variables = second::variables(&points, &tetrahedra.corners, &values, second, field, transfer);
+        let variables = variables.map_err(Error::Field)?;
+        let lengths = variables.iter().flatten().map(|[_, x, y, z]| DVec3::new(*x, *y, *z).length());
+        let steepest = lengths.fold(0.0, f64::max);
         let used = || tetrahedra.corners.iter().flatten().filter_map(|&p| points.get(p as usize));
         let finite = || used().filter(|p| p.is_finite());
         let (lo, hi) = finite().fold((DVec3::MAX, DVec3::MIN), |(lo, hi), p| (lo.min(*p), hi.max(*p)));
@@ -111,10 +133,18 @@ impl<'a> Reference<'a> {
                 let values = values.get(start..start + n)?;
                 let full = if field.kind() == Kind::Rgba { field.normal(0).half } else { 1.0 };
                 let at = |k: usize| values.get(k).map_or(0.0, |&v| if k < 3 { v / full } else { v });
-                Some([at(0), at(1), at(2), at(3)])
+                if let Some(variables) = &variables {
+                    let [g, x, y, z] = *variables.get(start)?;
+                    return Some([at(0), g, x, y, z]);
+                }
+                Some([at(0), at(1), at(2), at(3), 0.0])
             };
-            let mut tet =
-                Tetrahedron { corners: [DVec3::ZERO; 4], values: [[0.0; 4]; 4], centre: DVec3::ZERO, radius: 0.0 };
+            let mut tet = Tetrahedron {
+                corners: [DVec3::ZERO; 4],
+                values: [[0.0; COMPONENTS]; 4],
+                centre: DVec3::ZERO,
+                radius: 0.0,
+            };
             for (k, &c) in corners.iter().enumerate() {
                 let (Some(point), Some(values)) = (points.get(c as usize), value(c)) else {
                     return Err(Error::Mesh(format!("tetrahedron {i} names a point or cell that does not exist")));
@@ -129,7 +159,7 @@ impl<'a> Reference<'a> {
                 cells.push(tet);
             }
         }
-        Ok(Reference { transfer, kind: field.kind(), cells, boxes: None, centre: middle, extent })
+        Ok(Reference { transfer, kind: field.kind(), cells, boxes: None, centre: middle, extent, steepest })
     }
 
     /// Premultiplied RGBA of every pixel, row by row from the top. Runs on the current rayon pool.
@@ -156,6 +186,9 @@ impl<'a> Reference<'a> {
         let [start, end] = [ray.t_min - shift, ray.t_max - shift];
         let visible = intervals.iter().filter_map(|i| i.clip(start, end));
         match blend {
+            Blend::Composite if !self.transfer.is_of_one_variable() => {
+                self.composite_two(visible, origin, ray.direction)
+            }
             Blend::Composite => self.composite(visible),
             Blend::Maximum => self.maximum(visible),
         }
@@ -198,7 +231,7 @@ impl<'a> Reference<'a> {
         })
     }
 
-    fn color(&self, values: &[f64; 4]) -> [f64; 3] {
+    fn color(&self, values: &[f64; COMPONENTS]) -> [f64; 3] {
         match self.kind {
             Kind::Rgba => [values[0], values[1], values[2]],
             _ => self.transfer.color_at(values[0]),
@@ -235,7 +268,8 @@ impl<'a> Reference<'a> {
         let last = self.kind.components() - 1;
         let at = |x: f64| {
             let u = u0 + (u1 - u0) * x;
-            let v: [f64; 4] = std::array::from_fn(|k| interval.values[0][k] * (1.0 - u) + interval.values[1][k] * u);
+            let v: [f64; COMPONENTS] =
+                std::array::from_fn(|k| interval.values[0][k] * (1.0 - u) + interval.values[1][k] * u);
             let [r, g, b] = self.color(&v);
             [r, g, b, self.transfer.opacity_at(v[last])]
         };

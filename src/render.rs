@@ -6,6 +6,7 @@ mod frame;
 mod grid;
 mod loaded;
 mod prepared;
+mod second;
 mod stats;
 mod tables;
 
@@ -31,6 +32,7 @@ use glam::DVec3;
 use grid::LoadedGrid;
 use loaded::Loaded;
 use prepared::{AnyValues, Prepared};
+use second::Extra;
 pub use stats::{ProjectionStats, Stats, SweepStats};
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -66,6 +68,10 @@ pub struct Renderer {
     field: Option<Prepared>,
     transfer: Option<TransferFunction>,
     exact: Option<Exact<f32>>,
+    /// What a second variable, or light, needs.
+    extra: Extra,
+    /// The engine that was said to draw neither.
+    lacking: Option<&'static str>,
     integral: Choice,
     tables: Tables,
     /// What of a table is needed, once that is known: none for the exact integral.
@@ -123,6 +129,8 @@ impl Renderer {
             field: None,
             transfer: None,
             exact: None,
+            extra: Extra::default(),
+            lacking: None,
             integral: Choice::default(),
             tables: Tables::default(),
             key: None,
@@ -145,11 +153,18 @@ impl Renderer {
         if self.grid.is_some() {
             return self.name_caster();
         }
-        let walks = self.mesh.as_ref().is_some_and(|m| m.left_to_walk);
+        let left = self.mesh.as_ref().is_some_and(|m| m.left_to_walk);
+        let second = self.transfer.as_ref().is_some_and(|t| !t.is_of_one_variable());
+        let walks = left || second;
         self.stats.engine = if walks { Backend::without_device().engine() } else { self.backend.engine() }.into();
-        if walks && self.backend.gpu().is_some() && self.stats.device != "cpu" {
+        if left && self.backend.gpu().is_some() && self.stats.device != "cpu" {
             tracing::warn!("the mesh is too flat for the 32-bit floats of a device; the CPU draws it, by the walk");
         }
+        let lacking = self.backend.lacks_second().filter(|_| second && !left);
+        if let (Some(engine), true) = (lacking, lacking != self.lacking) {
+            tracing::warn!("{engine} draws neither a second variable nor light yet; the walk on the CPU draws them");
+        }
+        self.lacking = lacking;
         (self.stats.device, self.stats.adapter) = match self.backend.gpu().filter(|_| !walks) {
             Some(gpu) => ("gpu".into(), gpu.adapter.name.clone()),
             None => ("cpu".into(), format!("{} threads", self.pool.current_num_threads())),
@@ -159,6 +174,10 @@ impl Renderer {
     /// Takes `part` for changed, wherever it is kept.
     fn forget(&mut self, part: Part) {
         (self.exact, self.key) = (None, None);
+        match part {
+            Part::Function => self.extra.forget_function(),
+            Part::Mesh | Part::Field | Part::Points => self.extra.forget_field(),
+        }
         self.backend.forget(part);
         self.backend.forget(Part::Function);
     }
@@ -250,6 +269,7 @@ impl Renderer {
             return self.connect(points);
         }
         self.name_device();
+        self.extra.forget_field();
         self.backend.forget(Part::Points);
         // Extinction counts per normalised length.
         if scaled {
@@ -299,6 +319,7 @@ impl Renderer {
             grid.forget_function();
         }
         self.forget(Part::Function);
+        self.name_device();
     }
 
     /// Draws a frame. `progress` is told the share that is done, in [0, 1], and may be called from several threads. It
@@ -388,8 +409,10 @@ impl Renderer {
         if self.grid.is_some() {
             return self.cast(view, progress);
         }
+        if self.transfer.as_ref().is_some_and(|t| !t.is_of_one_variable()) {
+            return self.render_second(view, progress);
+        }
         let start = Instant::now();
-        let missing = |what: &str| Error::Render(format!("there is no {what} to draw"));
         let walks = self.mesh.as_ref().is_some_and(|m| m.left_to_walk);
         let on_device =
             !walks && !self.host_builds && self.backend.gpu().is_some_and(|gpu| builds(gpu, &self.integral));
@@ -467,7 +490,7 @@ impl Renderer {
         self.stats.device_ms = device_ms;
         self.stats.steps = counts.steps;
         self.stats.repaired_rays = counts.repaired;
-        self.stats.cpu_rays = counts.unfinished;
+        (self.stats.cpu_rays, self.stats.panels) = (counts.unfinished, 0);
         (self.stats.projection, self.stats.sweep) = (projection, sweep);
         self.stats.frame_ms = ms(start);
         self.build_next(late)?;
@@ -489,6 +512,10 @@ impl Renderer {
     pub fn stats(&self) -> &Stats {
         &self.stats
     }
+}
+
+fn missing(what: &str) -> Error {
+    Error::Render(format!("there is no {what} to draw"))
 }
 
 fn ms(since: Instant) -> f64 {

@@ -14,9 +14,11 @@ mod file;
 pub mod missing;
 mod opaque;
 mod reader;
+mod second;
 
 pub use opaque::Opaque;
 pub use reader::read;
+pub use second::widget;
 
 use crate::error::{Error, Result};
 use crate::field::{Association, Component, Field};
@@ -35,6 +37,8 @@ pub struct Scene {
     pub mesh: PathBuf,
     /// The array that is drawn.
     pub scalars: Scalars,
+    /// The array that is the second variable, of points or cells as the first; without, the gradient's length.
+    pub gradient_array: Option<String>,
     /// Colour and opacity.
     pub transfer: TransferFunction,
     /// The camera.
@@ -92,6 +96,18 @@ impl Scalars {
         };
         Field::new(mesh, &self.name, self.association, self.component.unwrap_or(default))
     }
+
+    /// The same, with the array called `second`, or the magnitude of its vectors, as second variable.
+    ///
+    /// # Errors
+    /// Likewise, and those of [`Field::with_second`].
+    pub fn field_with(&self, mesh: &impl Arrays, second: Option<&str>) -> Result<Field> {
+        let field = self.field(mesh)?;
+        let Some(name) = second else { return Ok(field) };
+        let association = Some(field.association());
+        let second = Scalars { name: name.to_owned(), association, component: None }.field(mesh)?;
+        field.with_second(second)
+    }
 }
 
 /// A depth buffer and its width and height in pixels.
@@ -107,10 +123,18 @@ pub struct DepthImage {
 pub type Backdrop = Vec<[f32; 3]>;
 
 impl Scene {
+    /// The field that the scene draws of `mesh`, with its second variable if an array is named for that.
+    ///
+    /// # Errors
+    /// Those of [`Scalars::field`] and [`Field::with_second`].
+    pub fn field(&self, mesh: &impl Arrays) -> Result<Field> {
+        self.scalars.field_with(mesh, self.gradient_array.as_deref())
+    }
+
     /// Reads a scene, and its depth image if it has one; the mesh is not opened.
     ///
     /// # Errors
-    /// [`Error::File`]; [`Error::Malformed`], which names the key, or the line and column; [`Error::Unsupported`] for bivariate widgets.
+    /// [`Error::File`]; [`Error::Malformed`], which names the key, or the line and column.
     pub fn open(path: &Path) -> Result<Self> {
         let text = std::fs::read(path).map_err(|e| Error::file(path, e))?;
         Self::parse(path, &text)
@@ -175,3 +199,6 @@ impl Scene {
 
 #[cfg(test)]
 mod tests;
+
+#[cfg(test)]
+mod second_tests;

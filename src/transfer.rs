@@ -2,12 +2,19 @@
 //! turns opacity into extinction.
 
 mod axis;
+pub mod bivariate;
 pub mod colormap;
+mod knots;
+pub mod shading;
 mod space;
 
 pub use axis::Axis;
+pub use bivariate::Bivariate;
+pub use shading::Shading;
 
 use crate::error::{Error, Result};
+use bivariate::Source;
+use std::sync::Arc;
 
 /// How an opacity a and the unit distance d give the extinction τ per unit length.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -35,7 +42,8 @@ pub enum Emission {
 /// Opacities from here on count as opaque in [`Convention::Opacity`].
 pub const OPAQUE: f64 = 1.0 - 1e-7;
 
-/// Colour and opacity as functions of the scalar, piecewise linear between knots. Two knots at one scalar are a step.
+/// Colour and opacity as functions of the scalar, piecewise linear between knots. Two knots at one scalar are a step. A
+/// second variable and light may be added.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TransferFunction {
     color: Vec<(f64, [f64; 3])>,
@@ -44,6 +52,9 @@ pub struct TransferFunction {
     unit_distance: f64,
     convention: Convention,
     emission: Emission,
+    /// Shared, as tables may be large.
+    bivariate: Option<Arc<Bivariate>>,
+    shading: Option<Arc<Shading>>,
 }
 
 impl TransferFunction {
@@ -58,20 +69,8 @@ impl TransferFunction {
         if !(unit_distance > 0.0 && unit_distance.is_finite()) {
             return fail(format!("the unit distance is {unit_distance}, not a positive length"));
         }
-        for (what, s) in [
-            ("color", color.iter().map(|k| k.0).collect::<Vec<_>>()),
-            ("opacity", opacity.iter().map(|k| k.0).collect()),
-        ] {
-            if s.is_empty() {
-                return fail(format!("the {what} function has no knot"));
-            }
-            if let Some(i) = s.iter().position(|x| !x.is_finite()) {
-                return fail(format!("{what} knot {i} is at {}", s[i]));
-            }
-            if let Some(i) = s.windows(2).position(|w| w[1] < w[0]) {
-                return fail(format!("{what} knot {} at {} comes after {}: knots must ascend", i + 1, s[i + 1], s[i]));
-            }
-        }
+        knots::check("color", color.iter().map(|k| k.0))?;
+        knots::check("opacity", opacity.iter().map(|k| k.0))?;
         let usable = |v: &f64| v.is_finite() && *v >= 0.0;
         if let Some((s, c)) = color.iter().find(|k| !k.1.iter().all(usable)) {
             return fail(format!("the color at {s} is {c:?}: components are 0 or more"));
@@ -86,7 +85,50 @@ impl TransferFunction {
             unit_distance,
             convention: Convention::default(),
             emission: Emission::default(),
+            bivariate: None,
+            shading: None,
         })
+    }
+
+    /// A function of two variables whose widgets or table say colour and opacity; there are none over the scalar alone.
+    ///
+    /// # Errors
+    /// [`Error::Transfer`] if the unit distance is not above 0, or neither widgets nor a table are there.
+    pub fn of_two(bivariate: Bivariate, unit_distance: f64) -> Result<Self> {
+        if *bivariate.source() == Source::Scalar {
+            return Err(Error::Transfer("there are neither widgets nor a table".into()));
+        }
+        Ok(Self::new(vec![(0.0, [1.0; 3])], vec![(0.0, 0.0)], unit_distance)?.with_bivariate(bivariate))
+    }
+
+    /// With other knots of colour and opacity.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_knots(&self, color: Vec<(f64, [f64; 3])>, opacity: Vec<(f64, f64)>) -> Result<Self> {
+        let Self { color, opacity, .. } = Self::new(color, opacity, self.unit_distance)?;
+        Ok(Self { color, opacity, ..self.clone() })
+    }
+
+    /// With another unit distance.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_unit_distance(&self, unit_distance: f64) -> Result<Self> {
+        Self::new(vec![(0.0, [0.0; 3])], vec![(0.0, 0.0)], unit_distance)?;
+        Ok(Self { unit_distance, ..self.clone() })
+    }
+
+    /// With a second variable.
+    pub fn with_bivariate(mut self, bivariate: Bivariate) -> Self {
+        self.bivariate = bivariate.needs_second().then(|| Arc::new(bivariate));
+        self
+    }
+
+    /// With light on the gradient.
+    pub fn with_shading(mut self, shading: Shading) -> Self {
+        self.shading = shading.needs_normals().then(|| Arc::new(shading));
+        self
     }
 
     /// With another opacity convention.
@@ -145,6 +187,26 @@ impl TransferFunction {
         self.emission
     }
 
+    /// What depends on a second variable, if anything does.
+    pub fn bivariate(&self) -> Option<&Bivariate> {
+        self.bivariate.as_deref()
+    }
+
+    /// The light on the gradient, if there is any.
+    pub fn shading(&self) -> Option<&Shading> {
+        self.shading.as_deref()
+    }
+
+    /// Whether the scalar alone says what is seen: no second variable, and no gradient.
+    pub fn is_of_one_variable(&self) -> bool {
+        self.bivariate.is_none() && self.shading.is_none()
+    }
+
+    /// Whether the functions of the scalar say colour and opacity; else widgets or a table do.
+    pub fn has_knots(&self) -> bool {
+        self.bivariate.as_ref().is_none_or(|b| *b.source() == Source::Scalar)
+    }
+
     /// Extinction per world unit of length at opacity `a`; infinite where `a` is opaque.
     pub fn extinction(&self, a: f64) -> f64 {
         match self.convention {
@@ -167,7 +229,7 @@ impl TransferFunction {
 }
 
 /// The piecewise linear function through `knots` at `s`, right-continuous at steps.
-fn interpolate<T>(knots: &[(f64, T)], s: f64, clamp: bool, value: impl Fn(&T) -> f64) -> f64 {
+pub(crate) fn interpolate<T>(knots: &[(f64, T)], s: f64, clamp: bool, value: impl Fn(&T) -> f64) -> f64 {
     let above = knots.partition_point(|k| k.0 <= s);
     let last = knots.len() - 1;
     match above {

@@ -433,7 +433,7 @@ impl Buckets {
 }
 
 /// For each point, the smallest index of a point at exactly its position; `None` if all positions differ.
-fn weld(points: &[DVec3]) -> Option<Vec<u32>> {
+pub(crate) fn weld(points: &[DVec3]) -> Option<Vec<u32>> {
     // −0 + 0 = 0, so that both zeros are one position.
     let bits = |i: u32| (points[i as usize] + 0.0).to_array().map(f64::to_bits);
     let hash = |i: u32| {

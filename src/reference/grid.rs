@@ -1,7 +1,7 @@
 //! Grids, as brute force draws them: every voxel is tested against every ray, and what lies inside is chopped into many
 //! pieces in which the field is taken for linear.
 
-use super::{Interval, Reference};
+use super::{COMPONENTS, Interval, Reference};
 use crate::error::{Error, Result};
 use crate::field::{Association, Field, Kind};
 use crate::grid::Grid;
@@ -26,7 +26,7 @@ struct Voxel {
     /// Along the axes, relative to the middle; the second corner need not be above the first.
     corners: [DVec3; 2],
     /// The field's components at its corners, x fastest, then y.
-    values: [[f64; 4]; 8],
+    values: [[f64; COMPONENTS]; 8],
 }
 
 /// Draws `view` of a regular or rectilinear grid, in f32.
@@ -50,10 +50,13 @@ impl<'a> Reference<'a> {
         if field.len() != count * n {
             return Err(Error::Field(format!("the field has {} values for {count} tuples", field.len())));
         }
+        if !transfer.is_of_one_variable() {
+            return Err(Error::Field("grids are drawn with one variable, and without light".into()));
+        }
         let full = if field.kind() == Kind::Rgba { field.normal(0).half } else { 1.0 };
         let tuple = |i: usize| {
             let own = |k: usize| if k < n { field.value(i * n + k) / if k < 3 { full } else { 1.0 } } else { 0.0 };
-            [own(0), own(1), own(2), own(3)]
+            [own(0), own(1), own(2), own(3), 0.0]
         };
         let hidden = grid.hidden();
         let [first, last] = [[0; 3], size.map(|n| n - 1)].map(|p| grid.point(p));
@@ -76,7 +79,7 @@ impl<'a> Reference<'a> {
             }
         }
         let boxes = Some(Boxes { to_axes, voxels });
-        Ok(Reference { transfer, kind: field.kind(), cells: vec![], boxes, centre, extent })
+        Ok(Reference { transfer, kind: field.kind(), cells: vec![], boxes, centre, extent, steepest: 0.0 })
     }
 }
 
@@ -113,7 +116,7 @@ impl Voxel {
                 |i: usize| -> f64 { (0..3).map(|k| if i >> k & 1 == 1 { w[k] } else { 1.0 - w[k] }).product() };
             std::array::from_fn(|c| (0..8).map(|i| weight(i) * self.values[i][c]).sum())
         };
-        let ends: Vec<(f64, [f64; 4])> = (0..=PIECES).map(|i| (place(i), value(place(i)))).collect();
+        let ends: Vec<(f64, [f64; COMPONENTS])> = (0..=PIECES).map(|i| (place(i), value(place(i)))).collect();
         ends.windows(2).map(|w| Interval { t: [w[0].0, w[1].0], values: [w[0].1, w[1].1] }).collect()
     }
 }

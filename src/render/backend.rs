@@ -124,6 +124,16 @@ impl Backend {
         matches!(self, Backend::WalkOnDevice(_))
     }
 
+    /// What it cannot draw a second variable or light with; none if it can.
+    pub(super) fn lacks_second(&self) -> Option<&'static str> {
+        match self {
+            Backend::Walk => None,
+            Backend::WalkOnDevice(_) => Some("the walk on a device"),
+            Backend::Project(_) => Some("the projection on the CPU"),
+            Backend::ProjectOnDevice(_) => Some("the projection on a device"),
+        }
+    }
+
     /// What it needs of a mesh.
     pub(super) fn needs(&self) -> Needs {
         match self {

@@ -109,6 +109,10 @@ impl Renderer {
         let grid = self.grid.as_mut().ok_or_else(|| missing("grid"))?;
         let field = grid.field.as_mut().ok_or_else(|| missing("field"))?;
         let transfer = self.transfer.as_ref().ok_or_else(|| missing("transfer function"))?;
+        if !transfer.is_of_one_variable() {
+            let what = "the caster of grids draws neither a second variable nor light yet; the mesh of the grid's voxels has both";
+            return Err(Error::Render(what.into()));
+        }
         let (kind, normal, scale) = (field.kind, field.normal, grid.volume.scale);
         reconstruction.check(grid.volume.diagonal())?;
         if field.exact.is_none() {

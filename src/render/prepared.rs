@@ -62,6 +62,11 @@ impl Prepared {
         Ok(())
     }
 
+    /// The field as it was set.
+    pub(super) fn field(&self) -> &Field {
+        &self.field
+    }
+
     pub(super) fn kind(&self) -> Kind {
         self.field.kind()
     }

@@ -34,6 +34,8 @@ pub struct Stats {
     pub repaired_rays: u64,
     /// Rays of the last frame that the device left to the CPU, as they take more work than its driver allows.
     pub cpu_rays: u64,
+    /// Panels that segments of two variables, or with light, were summed up in, over all rays of the last frame.
+    pub panels: u64,
     /// Memory held on the device for mesh and field, in bytes.
     pub device_bytes: u64,
     /// What had to be handed to the device for the last frame, in bytes; 0 on the CPU.

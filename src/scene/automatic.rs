@@ -121,6 +121,7 @@ pub fn scene(mesh: &Mesh, tetrahedra: &Tetrahedra, scalars: Scalars, field: &Fie
     let size = wishes.size.unwrap_or(SIZE);
     let camera = wishes.camera.unwrap_or_else(|| camera(mesh, tetrahedra, size));
     Ok(Scene {
+        gradient_array: None,
         mesh: PathBuf::new(),
         transfer: look::transfer(mesh, tetrahedra, &scalars, field, camera, &wishes)?,
         scalars,

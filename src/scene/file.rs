@@ -1,10 +1,12 @@
 //! A scene as its file has it: what may be written, and what is wrong with what was.
 
 use super::reader::kind;
+use super::second::{LightJson, Second, ShadeJson, TableJson, WidgetJson};
 use super::{DepthImage, Opaque, Scalars, Scene};
 use crate::error::{Error, Result};
 use crate::field::{Association, Component};
 use crate::image::npy::Npy;
+use crate::transfer::bivariate::{Bivariate, Source};
 use crate::transfer::{Convention, Emission, TransferFunction};
 use crate::view::{Blend, Camera, ClippingPlane, DepthBuffer, DepthKind, Projection, View};
 use serde::de::{IgnoredAny, Visitor};
@@ -30,7 +32,13 @@ pub(super) struct File {
     #[serde(default)]
     emission: EmissionJson,
     emission_scale: Option<f64>,
-    widgets: Option<IgnoredAny>,
+    widgets: Option<Vec<WidgetJson>>,
+    table2d: Option<TableJson>,
+    gradient_array: Option<String>,
+    gradient_opacity: Option<Vec<[f64; 2]>>,
+    silhouette: Option<f64>,
+    shade: Option<ShadeJson>,
+    lights: Option<Vec<LightJson>>,
     camera: CameraJson,
     size: [u32; 2],
     #[serde(default)]
@@ -48,8 +56,6 @@ pub(super) struct File {
     device: Option<Value>,
     integral: Option<Value>,
     projection: Option<Map<String, Value>>,
-    #[serde(rename = "gradient_array")]
-    _gradient_array: Option<IgnoredAny>,
     #[serde(rename = "tol")]
     _tol: Option<IgnoredAny>,
     #[serde(rename = "truth_of")]
@@ -195,18 +201,25 @@ impl File {
     /// Makes sense of it; files that it names are relative to the folder of `path`.
     pub(super) fn scene(mut self, path: &Path) -> Result<Scene> {
         let malformed = |what: String| Error::malformed(path, what);
-        if self.widgets.is_some() {
-            let what = "widgets: bivariate transfer functions are not drawn yet; use color and opacity";
-            return Err(Error::unsupported(path, what));
-        }
         self.check().map_err(malformed)?;
-        let transfer = self.transfer().map_err(malformed)?;
+        let second = Second {
+            widgets: self.widgets.take(),
+            table: self.table2d.take(),
+            gradient_opacity: self.gradient_opacity.take(),
+            silhouette: self.silhouette,
+            shade: self.shade.take(),
+            lights: self.lights.take(),
+            maximum: matches!(self.blend, BlendJson::Maximum),
+        };
+        let (bivariate, shading) = second.read(path)?;
+        let transfer = self.transfer(bivariate).map_err(malformed)?.with_shading(shading);
         let camera = self.camera.camera().map_err(malformed)?;
         let folder = path.parent().unwrap_or(Path::new(""));
         let depth = self.depth.map(|depth| depth.image(folder)).transpose()?;
         let scene = Scene {
             mesh: folder.join(&self.mesh),
             scalars: self.scalars.into(),
+            gradient_array: self.gradient_array,
             transfer,
             camera,
             size: self.size,
@@ -241,6 +254,12 @@ impl File {
     fn check(&self) -> Result<(), String> {
         check_name("mesh", &self.mesh.to_string_lossy())?;
         check_name("scalars.name", &self.scalars.name)?;
+        if let Some(name) = &self.gradient_array {
+            check_name("gradient_array", name)?;
+        }
+        if let Some(table) = &self.table2d {
+            check_name("table2d.file", &table.file.to_string_lossy())?;
+        }
         if let Some(depth) = &self.depth {
             check_name("depth.file", &depth.file.to_string_lossy())?;
         }
@@ -265,13 +284,7 @@ impl File {
     }
 
     /// Takes the transfer function, or says what is wrong with it.
-    fn transfer(&mut self) -> Result<TransferFunction, String> {
-        let (color, opacity) = match (self.color.take(), self.opacity.take()) {
-            (Some(c), Some(o)) => (c, o),
-            (Some(_), None) => return Err("there is color but no opacity".into()),
-            (None, Some(_)) => return Err("there is opacity but no color".into()),
-            (None, None) => return Err("there is neither color nor opacity".into()),
-        };
+    fn transfer(&mut self, bivariate: Bivariate) -> Result<TransferFunction, String> {
         let emission = match (&self.emission, self.emission_scale) {
             (EmissionJson::Direct, scale) => Emission::Direct { scale: scale.unwrap_or(1.0) },
             (EmissionJson::Chromatic, None) => Emission::Chromatic,
@@ -283,11 +296,23 @@ impl File {
             ConventionJson::Extinction => Convention::Extinction,
             ConventionJson::Opacity => Convention::Opacity,
         };
-        let color = color.into_iter().map(|[s, r, g, b]| (s, [r, g, b])).collect();
-        let opacity = opacity.into_iter().map(|[s, a]| (s, a)).collect();
-        let transfer =
-            TransferFunction::new(color, opacity, self.unit_distance).and_then(|t| t.with_emission(emission));
-        Ok(transfer.map_err(|e| e.to_string())?.with_clamp(self.clamp.unwrap_or(true)).with_convention(convention))
+        let knots = |color: Vec<[f64; 4]>, opacity: Vec<[f64; 2]>| {
+            let color = color.into_iter().map(|[s, r, g, b]| (s, [r, g, b])).collect();
+            (color, opacity.into_iter().map(|[s, a]| (s, a)).collect())
+        };
+        let replaced = *bivariate.source() != Source::Scalar;
+        let transfer = match (self.color.take(), self.opacity.take()) {
+            (None, None) if replaced => TransferFunction::of_two(bivariate, self.unit_distance),
+            (Some(c), Some(o)) => {
+                let (color, opacity) = knots(c, o);
+                TransferFunction::new(color, opacity, self.unit_distance).map(|t| t.with_bivariate(bivariate))
+            }
+            (Some(_), None) => return Err("there is color but no opacity".into()),
+            (None, Some(_)) => return Err("there is opacity but no color".into()),
+            (None, None) => return Err("there is neither color nor opacity".into()),
+        };
+        let transfer = transfer.and_then(|t| t.with_emission(emission)).map_err(|e| e.to_string())?;
+        Ok(transfer.with_clamp(self.clamp.unwrap_or(true)).with_convention(convention))
     }
 }
 

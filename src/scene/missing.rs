@@ -129,11 +129,7 @@ fn beyond(
     let opacity = opacity.unwrap_or_else(|| opacities.iter().fold(0.0, |most, k| k.1.max(most)));
     add(&mut colors, [step, value + gap], color, upward, (!transfer.clamp()).then_some([0.0; 3]));
     add(&mut opacities, [step, value + gap], opacity, upward, (!transfer.clamp()).then_some(0.0));
-    let transfer = TransferFunction::new(colors, opacities, transfer.unit_distance())?
-        .with_convention(transfer.convention())
-        .with_clamp(transfer.clamp())
-        .with_emission(transfer.emission())?;
-    Ok((value, transfer))
+    Ok((value, transfer.with_knots(colors, opacities)?))
 }
 
 /// Has knots end in `value` from `step` to `end`, beyond them `upward` or downward; between is what was there, or `none`.

@@ -1,5 +1,6 @@
 //! JSON into the types of a scene. What is wrong is said in the words of scenes, keys, lists and numbers, with its place.
 
+use super::second::OPEN_END;
 use serde::de::value::StrDeserializer;
 use serde::de::{
     self, DeserializeOwned, DeserializeSeed, Deserializer, Error as _, Expected, IntoDeserializer, MapAccess,
@@ -276,7 +277,10 @@ impl<'de> Deserializer<'de> for Reader<'de> {
         visitor.visit_some(self)
     }
 
-    fn deserialize_newtype_struct<V: Visitor<'de>>(self, _: &'static str, visitor: V) -> Result<V::Value, Mistake> {
+    fn deserialize_newtype_struct<V: Visitor<'de>>(self, name: &'static str, visitor: V) -> Result<V::Value, Mistake> {
+        if name == OPEN_END && self.0.is_null() {
+            return visitor.visit_none();
+        }
         visitor.visit_newtype_struct(self)
     }
 

@@ -183,8 +183,6 @@ fn mistakes_are_named() {
             assert!(!message.contains(strange), "{strange}: {message}");
         }
     }
-    let widgets = with(r#""widgets": [{"type": "uniform"}]"#).unwrap_err();
-    assert!(matches!(&widgets, Error::Unsupported { what, .. } if what.contains("widgets")), "{widgets}");
     let mut scene = with(r#""depth": {"file": "depth.npy", "kind": "ray"}"#).unwrap();
     scene.size = [5, 3];
     assert!(scene.view().unwrap_err().to_string().contains("3x5"));

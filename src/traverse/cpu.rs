@@ -2,15 +2,20 @@
 //!
 //! Positions are f64, so that thin layers and great distances cost no accuracy; segments are integrated in f32.
 
+mod segments;
+
 use crate::cell::{Face, Frame};
 use crate::geometry::boundary::{Beam, Candidate};
 use crate::geometry::{Cell, Geometry, Values};
 use crate::image::Image;
-use crate::integral::{Batch, Integral, Light};
+use crate::integral::second::Second;
+use crate::integral::{Integral, Light};
 use crate::mesh::faces::BOUNDARY;
+use crate::real::Real;
 use crate::view::{Blend, View};
 use glam::DVec2;
 use rayon::prelude::*;
+use segments::{One, Segments, Two};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 
@@ -39,6 +44,8 @@ pub struct Counts {
     pub repaired: u64,
     /// Rays that a device left to the CPU.
     pub unfinished: u64,
+    /// Panels that segments of two variables, or with light, were summed up in.
+    pub panels: u64,
 }
 
 /// Draws a frame on the current rayon pool. `pixel` turns the largest values along a ray into a premultiplied colour
@@ -52,6 +59,28 @@ pub fn render<const N: usize>(
     view: &View,
     progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
 ) -> (Image, Counts) {
+    render_with(geometry, values, &|| One::new(integral), pixel, view, progress)
+}
+
+/// Draws a frame whose segments are of two variables, or with light: `values` are s and g, or those and the gradient.
+pub(crate) fn render_two<const N: usize>(
+    geometry: &Geometry,
+    values: &Values<N>,
+    second: &Second,
+    view: &View,
+    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+) -> (Image, Counts) {
+    render_with(geometry, values, &|| Two::new(second), &|_| [0.0; 4], view, progress)
+}
+
+fn render_with<const N: usize, S: Segments<N>>(
+    geometry: &Geometry,
+    values: &Values<N>,
+    segments: &(impl Fn() -> S + Sync),
+    pixel: &(dyn Fn(&[S::Value; N]) -> [f32; 4] + Sync),
+    view: &View,
+    progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
+) -> (Image, Counts) {
     let mut image = Image::new(view.size());
     let [w, h] = view.size();
     let (done, bands) = (AtomicUsize::new(0), h.div_ceil(TILE) as usize);
@@ -61,7 +90,7 @@ pub fn render<const N: usize>(
         .par_chunks_mut((w * TILE) as usize)
         .enumerate()
         .map(|(band, rows)| {
-            let mut tracer = Tracer::new(geometry, values, integral, view);
+            let mut tracer = Tracer::new(geometry, values, segments(), view);
             if stopped.load(Relaxed) {
                 return tracer.counts;
             }
@@ -71,12 +100,13 @@ pub fn render<const N: usize>(
             if progress((done.fetch_add(1, Relaxed) + 1) as f64 / bands as f64).is_break() {
                 stopped.store(true, Relaxed);
             }
-            tracer.counts
+            Counts { panels: tracer.segments.panels(), ..tracer.counts }
         })
         .reduce(Counts::default, |a, b| Counts {
             steps: a.steps + b.steps,
             repaired: a.repaired + b.repaired,
             unfinished: 0,
+            panels: a.panels + b.panels,
         });
     (image, counts)
 }
@@ -91,8 +121,8 @@ pub(crate) fn render_pixels<const N: usize>(
     indices: &[usize],
 ) -> Vec<[f32; 4]> {
     let w = view.size()[0];
-    let new = || Tracer::new(geometry, values, integral, view);
-    let draw = |tracer: &mut Tracer<N>, &index: &usize| {
+    let new = || Tracer::new(geometry, values, One::new(integral), view);
+    let draw = |tracer: &mut Tracer<N, One>, &index: &usize| {
         let (i, j) = ((index % w as usize) as u32, (index / w as usize) as u32);
         tracer.find_candidates([i, j], [i + 1, j + 1]);
         tracer.pixel(i, j, pixel)
@@ -109,26 +139,25 @@ struct Entry {
 }
 
 /// What a ray has gathered.
-struct Gathered<const N: usize> {
+struct Gathered<V, const N: usize> {
     light: Light<f32>,
-    largest: Option<[f32; N]>,
+    largest: Option<[V; N]>,
 }
 
 /// Traces rays, one after another.
-struct Tracer<'a, const N: usize> {
+struct Tracer<'a, const N: usize, S> {
     geometry: &'a Geometry,
     values: &'a Values<N>,
-    integral: Integral<'a>,
+    segments: S,
     view: &'a View,
     both_ways: bool,
     candidates: Vec<Candidate>,
     entries: Vec<Entry>,
-    batch: Batch,
     counts: Counts,
 }
 
-impl<'a, const N: usize> Tracer<'a, N> {
-    fn new(geometry: &'a Geometry, values: &'a Values<N>, integral: Integral<'a>, view: &'a View) -> Self {
+impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
+    fn new(geometry: &'a Geometry, values: &'a Values<N>, segments: S, view: &'a View) -> Self {
         let [low, high] = geometry.boundary.bounds();
         let both_ways = view.eye().is_some_and(|eye| {
             let eye = (eye - geometry.centre) * geometry.scale;
@@ -137,27 +166,32 @@ impl<'a, const N: usize> Tracer<'a, N> {
         Tracer {
             geometry,
             values,
-            integral,
+            segments,
             view,
             both_ways,
             candidates: vec![],
             entries: vec![],
-            batch: Batch::default(),
             counts: Counts::default(),
         }
     }
 
     /// As [`Self::tile`], in the widest instructions that the processor has; their results are the same.
-    fn draw(&mut self, left: u32, top: u32, rows: &mut [[f32; 4]], pixel: &(dyn Fn(&[f32; N]) -> [f32; 4] + Sync)) {
+    fn draw(
+        &mut self,
+        left: u32,
+        top: u32,
+        rows: &mut [[f32; 4]],
+        pixel: &(dyn Fn(&[S::Value; N]) -> [f32; 4] + Sync),
+    ) {
         #[cfg(target_arch = "x86_64")]
         if std::arch::is_x86_feature_detected!("avx2") {
             #[target_feature(enable = "avx2")]
-            fn wide<const N: usize>(
-                tracer: &mut Tracer<N>,
+            fn wide<const N: usize, S: Segments<N>>(
+                tracer: &mut Tracer<N, S>,
                 left: u32,
                 top: u32,
                 rows: &mut [[f32; 4]],
-                pixel: &(dyn Fn(&[f32; N]) -> [f32; 4] + Sync),
+                pixel: &(dyn Fn(&[S::Value; N]) -> [f32; 4] + Sync),
             ) {
                 tracer.tile(left, top, rows, pixel);
             }
@@ -170,7 +204,13 @@ impl<'a, const N: usize> Tracer<'a, N> {
 
     /// Draws the tile whose upper left pixel is (`left`, `top`) into `rows`, which start with row `top` of the image.
     #[inline(always)]
-    fn tile(&mut self, left: u32, top: u32, rows: &mut [[f32; 4]], pixel: &(dyn Fn(&[f32; N]) -> [f32; 4] + Sync)) {
+    fn tile(
+        &mut self,
+        left: u32,
+        top: u32,
+        rows: &mut [[f32; 4]],
+        pixel: &(dyn Fn(&[S::Value; N]) -> [f32; 4] + Sync),
+    ) {
         let w = self.view.size()[0];
         let (right, bottom) = ((left + TILE).min(w), top + (rows.len() as u32 / w).min(TILE));
         self.find_candidates([left, top], [right, bottom]);
@@ -186,7 +226,7 @@ impl<'a, const N: usize> Tracer<'a, N> {
 
     /// Draws one pixel, whose candidates were found.
     #[inline(always)]
-    fn pixel(&mut self, i: u32, j: u32, pixel: &(dyn Fn(&[f32; N]) -> [f32; 4] + Sync)) -> [f32; 4] {
+    fn pixel(&mut self, i: u32, j: u32, pixel: &(dyn Fn(&[S::Value; N]) -> [f32; 4] + Sync)) -> [f32; 4] {
         let gathered = self.trace(i, j);
         match (self.view.blend(), gathered.largest) {
             (Blend::Composite, _) => {
@@ -224,7 +264,7 @@ impl<'a, const N: usize> Tracer<'a, N> {
 
     /// Traces the ray of pixel (`i`, `j`).
     #[inline(always)]
-    fn trace(&mut self, i: u32, j: u32) -> Gathered<N> {
+    fn trace(&mut self, i: u32, j: u32) -> Gathered<S::Value, N> {
         let ray = self.view.ray(i, j);
         let Geometry { centre, scale, .. } = *self.geometry;
         let origin = (ray.origin - centre) * scale;
@@ -257,9 +297,10 @@ impl<'a, const N: usize> Tracer<'a, N> {
         pixel: DVec2,
         [t_min, t_max]: [f64; 2],
         anyhow: bool,
-        gathered: &mut Gathered<N>,
+        gathered: &mut Gathered<S::Value, N>,
     ) -> bool {
-        self.batch.clear();
+        let (origin, along) = frame.ray();
+        self.segments.begin(origin, along);
         if !self.find_entries(frame, pixel) && !anyhow {
             return false;
         }
@@ -272,7 +313,7 @@ impl<'a, const N: usize> Tracer<'a, N> {
                 return false;
             }
         }
-        self.batch.flush(self.integral.exact.direct, &mut gathered.light);
+        self.segments.end(&mut gathered.light);
         true
     }
 
@@ -305,7 +346,7 @@ impl<'a, const N: usize> Tracer<'a, N> {
         frame: &Frame,
         e: usize,
         [t_min, t_max]: [f64; 2],
-        gathered: &mut Gathered<N>,
+        gathered: &mut Gathered<S::Value, N>,
     ) -> Option<[f64; 3]> {
         let Geometry { points, cells, .. } = self.geometry;
         let Entry { t, points: mut ids, mut cell, mut face } = self.entries[e];
@@ -333,10 +374,10 @@ impl<'a, const N: usize> Tracer<'a, N> {
                         } else if x == left {
                             back
                         } else {
-                            mix(&front, &back, ((x - entered) / (left - entered)) as f32)
+                            mix(&front, &back, (x - entered) / (left - entered))
                         }
                     };
-                    self.gather(at(from), at(to), to - from, gathered);
+                    self.gather(at(from), at(to), [from, to], gathered);
                 }
                 reached = left;
                 if reached >= t_max || self.is_over(gathered) {
@@ -354,19 +395,14 @@ impl<'a, const N: usize> Tracer<'a, N> {
 
     /// Whether nothing behind can be seen.
     #[inline(always)]
-    fn is_over(&self, gathered: &Gathered<N>) -> bool {
-        gathered.light.through < least_light(self.integral.exact.direct)
+    fn is_over(&self, gathered: &Gathered<S::Value, N>) -> bool {
+        gathered.light.through < self.segments.least_light()
     }
 
     #[inline(always)]
-    fn gather(&mut self, front: [f32; N], back: [f32; N], length: f64, gathered: &mut Gathered<N>) {
+    fn gather(&mut self, front: [S::Value; N], back: [S::Value; N], t: [f64; 2], gathered: &mut Gathered<S::Value, N>) {
         if self.view.blend() == Blend::Composite {
-            match self.integral.table {
-                None => self.batch.add(self.integral.exact, &front, &back, length as f32, &mut gathered.light),
-                Some(table) => {
-                    table.add(self.integral.exact, front[N - 1], back[N - 1], length as f32, &mut gathered.light);
-                }
-            }
+            self.segments.add(&front, &back, t, &mut gathered.light);
         } else if front.iter().chain(&back).all(|v| v.is_finite()) {
             for v in [front, back] {
                 if gathered.largest.is_none_or(|l| v[N - 1] > l[N - 1]) {
@@ -378,16 +414,16 @@ impl<'a, const N: usize> Tracer<'a, N> {
 
     /// The field at `weights` on the face `ids` of `cell`.
     #[inline(always)]
-    fn value(&self, cell: u32, ids: &[u32; 3], weights: &[f64; 3]) -> [f32; N] {
+    fn value(&self, cell: u32, ids: &[u32; 3], weights: &[f64; 3]) -> [S::Value; N] {
         let corners: [&[f32; N]; 3] = match self.values {
-            Values::Cell(v) => return v[cell as usize],
+            Values::Cell(v) => return v[cell as usize].map(|v| Real::of(v.into())),
             Values::Point(v) => ids.map(|p| &v[p as usize]),
             Values::Corner(v) => {
                 let own = &self.geometry.cells[cell as usize].corners;
                 ids.map(|p| &v[cell as usize][own.iter().position(|&c| c == p).unwrap_or(0)])
             }
         };
-        std::array::from_fn(|k| (0..3).map(|i| f64::from(corners[i][k]) * weights[i]).sum::<f64>() as f32)
+        std::array::from_fn(|k| Real::of((0..3).map(|i| f64::from(corners[i][k]) * weights[i]).sum::<f64>()))
     }
 }
 
@@ -416,6 +452,7 @@ fn ids_before(mut ids: [u32; 3], dropped: usize, left_behind: u32) -> [u32; 3] {
     ids
 }
 
-fn mix<const N: usize>(a: &[f32; N], b: &[f32; N], w: f32) -> [f32; N] {
+fn mix<R: Real, const N: usize>(a: &[R; N], b: &[R; N], w: f64) -> [R; N] {
+    let w = R::of(w);
     std::array::from_fn(|k| a[k] + (b[k] - a[k]) * w)
 }

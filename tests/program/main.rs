@@ -4,6 +4,7 @@
 
 mod look;
 mod refusals;
+mod second;
 
 use assert_cmd::Command;
 use halite::image::Image;

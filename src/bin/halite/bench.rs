@@ -5,7 +5,6 @@ use anyhow::{Context, Result};
 use clap::Args;
 use halite::gpu::{self, DeviceChoice};
 use halite::render::{ProjectionStats, Renderer, Stats};
-use halite::transfer::TransferFunction;
 use halite::view::View;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -143,11 +142,7 @@ fn measure(options: &Options, job: &Job, renderer: &mut Renderer) -> Result<Run>
         }
         let tabulated = renderer.stats().table_bytes > 0;
         let old = &job.scene.transfer;
-        let unit = old.unit_distance() * (1.0 + 1e-6);
-        let edited = TransferFunction::new(old.color().to_vec(), old.opacity().to_vec(), unit)?
-            .with_convention(old.convention())
-            .with_clamp(old.clamp())
-            .with_emission(old.emission())?;
+        let edited = old.with_unit_distance(old.unit_distance() * (1.0 + 1e-6))?;
         let (mut frames, mut edits) = (Vec::new(), Vec::new());
         let (mut still, mut moved) = (Vec::new(), Vec::new());
         let mut cpu_ms = Some(0.0);

@@ -1,7 +1,7 @@
 use crate::{input, output, parse, progress};
 use anyhow::{Context, Result};
 use clap::Args;
-use halite::field::Association;
+use halite::field::{Association, Gradient};
 use halite::geometry::Geometry;
 use halite::geometry::contacts::Contacts;
 use halite::grid::Grid;
@@ -207,8 +207,16 @@ fn describe(out: &mut String, mesh: &Mesh, (times, step): (&[f64], usize)) -> Re
         _ => points.len(),
     };
     writeln!(out, "  {} of memory to render one scalar", size((geometry.bytes() + 4 * tuples as u64) as f64))?;
-    if let Some((scalars, why)) = choice {
-        writeln!(out, "  \"{}\" if no other array is asked for: {why}", scalars.name)?;
+    let Some((scalars, why)) = choice else { return Ok(()) };
+    writeln!(out, "  \"{}\" if no other array is asked for: {why}", scalars.name)?;
+    let gradient = scalars.field(mesh).and_then(|field| Gradient::new(&points, &tetrahedra, &field));
+    if let Ok(gradient) = gradient {
+        let [lo, hi] = gradient.range().map(short);
+        writeln!(
+            out,
+            "  its gradient is {lo} to {hi} long, and takes {} where it is drawn",
+            size(gradient.bytes() as f64)
+        )?;
     }
     Ok(())
 }

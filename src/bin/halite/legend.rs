@@ -33,7 +33,7 @@ impl Legend {
     /// The legend of `field`, which `scalars` are; none if its colours are its own, or there is one at most.
     pub(crate) fn new(scalars: &Scalars, field: &Field, transfer: &TransferFunction, log: bool) -> Option<Self> {
         let (first, last) = (transfer.color().first()?.0, transfer.color().last()?.0);
-        if field.kind() == Kind::Rgba || first >= last {
+        if field.kind() == Kind::Rgba || first >= last || !transfer.has_knots() {
             return None;
         }
         let axis = if log { Axis::logarithmic([first, last]).ok()? } else { Axis::linear([first, last]) };
@@ -100,7 +100,7 @@ impl Legend {
 }
 
 /// Places on the bar, and the numbers there: round ones.
-fn numbers(axis: &Axis) -> Vec<(f64, String)> {
+pub(crate) fn numbers(axis: &Axis) -> Vec<(f64, String)> {
     let [lo, hi] = axis.range();
     if axis.is_logarithmic() {
         let decades = (hi / lo).log10();
@@ -150,14 +150,14 @@ fn plain(s: f64) -> String {
 }
 
 /// A picture that letters of several pixels are written on.
-struct Canvas<'a> {
-    image: &'a mut Image,
-    scale: usize,
+pub(crate) struct Canvas<'a> {
+    pub(crate) image: &'a mut Image,
+    pub(crate) scale: usize,
 }
 
 impl Canvas<'_> {
     /// Covers what is between two corners with a colour, as opaque as `alpha`.
-    fn fill(&mut self, [left, top, right, bottom]: [usize; 4], color: [f32; 3], alpha: f32) {
+    pub(crate) fn fill(&mut self, [left, top, right, bottom]: [usize; 4], color: [f32; 3], alpha: f32) {
         let [w, h] = self.image.size.map(|n| n as usize);
         for y in top..bottom.min(h) {
             for p in &mut self.image.pixels[y * w..][left.min(w)..right.clamp(left.min(w), w)] {
@@ -167,7 +167,8 @@ impl Canvas<'_> {
         }
     }
 
-    fn write(&mut self, font: &MonoFont, [x, y]: [usize; 2], text: &str, ink: [f32; 3]) {
+    /// Writes `text` below and right of a corner.
+    pub(crate) fn write(&mut self, font: &MonoFont, [x, y]: [usize; 2], text: &str, ink: [f32; 3]) {
         let [r, g, b] = ink.map(|c| (c * 255.0) as u8);
         let style = MonoTextStyle::new(font, Rgb888::new(r, g, b));
         let at = [x, y].map(|n| (n / self.scale) as i32);

@@ -1,10 +1,10 @@
 //! Colours and opacities that options ask for.
 
 use crate::render::Request;
-use anyhow::Result;
+use anyhow::{Result, bail};
 use halite::scene::Scene;
+use halite::transfer::Axis;
 use halite::transfer::colormap::ColorMap;
-use halite::transfer::{Axis, TransferFunction};
 use std::path::Path;
 
 /// How far knots may be off on a logarithmic axis: below what 8 bits show.
@@ -28,7 +28,16 @@ pub(crate) fn color_map(text: &str) -> Result<ColorMap> {
 
 /// `scene`, with the transfer function that the options ask for.
 pub(crate) fn restyled(options: &Request, mut scene: Scene, map: Option<ColorMap>) -> Result<Scene> {
-    let old = &scene.transfer;
+    let old = scene.transfer.with_unit_distance(options.unit_distance.unwrap_or(scene.transfer.unit_distance()))?;
+    let asked = [
+        ("--colormap", map.is_some()),
+        ("--range", options.range.is_some()),
+        ("--log", options.log),
+        ("--opacity", options.opacity.is_some()),
+    ];
+    if let (false, Some((option, _))) = (old.has_knots(), asked.iter().find(|(_, asked)| *asked)) {
+        bail!("{option}: widgets or a table say colour and opacity here, and there are none over the scalar alone");
+    }
     let (first, last) = (old.color()[0].0, old.color()[old.color().len() - 1].0);
     let range = options.range.unwrap_or([first, last]);
     let axis = match &map {
@@ -57,9 +66,6 @@ pub(crate) fn restyled(options: &Request, mut scene: Scene, map: Option<ColorMap
         }
         None => old.color().to_vec(),
     };
-    scene.transfer = TransferFunction::new(color, opacity, options.unit_distance.unwrap_or(old.unit_distance()))?
-        .with_convention(old.convention())
-        .with_clamp(old.clamp())
-        .with_emission(old.emission())?;
+    scene.transfer = old.with_knots(color, opacity)?;
     Ok(scene)
 }

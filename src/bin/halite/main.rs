@@ -5,6 +5,7 @@ mod bench;
 mod camera;
 mod demo;
 mod drawn;
+mod histogram;
 mod info;
 mod input;
 mod integral;
@@ -14,6 +15,7 @@ mod output;
 mod parse;
 mod progress;
 mod render;
+mod second;
 mod steps;
 mod study;
 mod tables;
@@ -46,6 +48,7 @@ enum Command {
     Bench(Box<bench::Options>),
     Study(Box<study::Options>),
     Tables(Box<tables::Options>),
+    Histogram(Box<histogram::Options>),
     Demo(demo::Options),
 }
 
@@ -106,6 +109,7 @@ fn run(cli: Cli) -> Result<()> {
         Command::Bench(options) => bench::run(&options, cli.threads),
         Command::Study(options) => study::run(&options, cli.threads),
         Command::Tables(options) => tables::run(&options, cli.threads),
+        Command::Histogram(options) => histogram::run(&options, cli.threads),
         Command::Demo(options) => demo::run(&options, &mut Renderer::new(cli.threads)?),
     }
 }

@@ -4,6 +4,7 @@ use glam::DVec3;
 use halite::field::Component;
 use halite::io::Time;
 use halite::scene::automatic::{Opacity, Place};
+use halite::transfer::shading::Shade;
 use halite::view::ClippingPlane;
 
 fn number(text: &str) -> Result<f64, String> {
@@ -46,6 +47,20 @@ pub(crate) fn positive(text: &str) -> Result<f64, String> {
 pub(crate) fn gain(text: &str) -> Result<f32, String> {
     let gain = positive(text)? as f32;
     if gain > 0.0 && gain.is_finite() { Ok(gain) } else { Err(format!("{text} is beyond 32 bits")) }
+}
+
+/// A number of 0 or more.
+pub(crate) fn not_negative(text: &str) -> Result<f64, String> {
+    number(text).and_then(|n| if n >= 0.0 { Ok(n) } else { Err("it is 0 or more".into()) })
+}
+
+/// `AMBIENT,DIFFUSE,SPECULAR,POWER`, all at least 0
+pub(crate) fn shade(text: &str) -> Result<Shade, String> {
+    let [ambient, diffuse, specular, power] = numbers(text)?;
+    if [ambient, diffuse, specular, power].iter().any(|x| *x < 0.0) {
+        return Err("the shares of ambient, diffuse and specular light and the power are 0 or more".into());
+    }
+    Ok(Shade { ambient, diffuse, specular, power, two_sided: true })
 }
 
 /// Any finite number.
@@ -183,6 +198,8 @@ mod tests {
         assert_eq!(color_and_opacity("1,0,0.5"), Ok(([1.0, 0.0, 0.5], None)));
         assert_eq!(color_and_opacity("1,0,0,2"), Ok(([1.0, 0.0, 0.0], Some(2.0))));
         assert!(["1,0", "2,0,0", "1,0,0,-1"].iter().all(|wrong| color_and_opacity(wrong).is_err()));
+        assert!(shade("0.1,0.7,0.2,20").is_ok_and(|s| s.power == 20.0 && s.two_sided));
+        assert!(shade("0.1,0.7").is_err() && shade("0,-1,0,1").is_err() && not_negative("-0.1").is_err());
         assert!(range("2:1").is_err() && range("nan:1").is_err() && vector("1,2").is_err());
         assert!(background("0,0,255").is_err() && plane("0,0,0,0,0,0").is_err() && positive("0").is_err());
     }

@@ -1,5 +1,6 @@
 use crate::drawn::{backdrop, draw, ms};
 use crate::legend::Legend;
+use crate::second::Second;
 use crate::steps::{self, Steps};
 use crate::{camera, input, integral, look, output, parse, progress, variant};
 use anyhow::{Context, Result, bail};
@@ -55,7 +56,7 @@ pub(crate) struct Request {
     time: Option<Time>,
     /// Width and height in pixels [default: the scene's, or 1024x768]
     #[arg(long, value_name = "WxH", value_parser = parse::size)]
-    size: Option<[u32; 2]>,
+    pub(crate) size: Option<[u32; 2]>,
     /// What stands for the field of a regular or rectilinear grid between samples: itself, parabolas, lines, or rectangles
     /// by the middle, the left or the right sample [default: exact]
     #[arg(long, value_name = "ORDER", value_parser = parse::order)]
@@ -115,6 +116,8 @@ pub(crate) struct Request {
     clip: Vec<ClippingPlane>,
 
     #[command(flatten)]
+    second: Second,
+    #[command(flatten)]
     camera: camera::Options,
 
     /// How rays find their cells
@@ -170,6 +173,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     }
     let request = &options.request;
     let given = request.scene()?;
+    request.second.check(given.as_ref())?;
     let mut renderer = request.renderer(threads, given.as_ref(), request.device(given.as_ref()))?;
     request.check_room(given.as_ref())?;
     let report = if options.all_times {
@@ -222,7 +226,8 @@ pub(crate) fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut 
     let from_file = given.is_some();
     let start = Instant::now();
     let path = given.as_ref().map_or(options.input.clone(), |scene| scene.mesh.clone());
-    let (mut mesh, mut grid) = input::mesh(&path, steps.time)?;
+    let of_two = given.as_ref().is_some_and(|scene| !scene.transfer.is_of_one_variable()) || options.second.is_given();
+    let (mut mesh, mut grid) = input::mesh(&path, steps.time, of_two)?;
     if grid.is_none() && options.reconstruction.is_some() {
         bail!("{}: --reconstruction is for regular and rectilinear grids, and this is a mesh", path.display());
     }
@@ -249,7 +254,9 @@ pub(crate) fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut 
             None => options.scalars(given.as_ref(), &mesh)?,
         };
         steps.scalars = Some(scalars.clone());
-        let field = scalars.field(&mesh).with_context(|| path.display().to_string())?;
+        let of_scene = given.as_ref().and_then(|scene| scene.gradient_array.as_deref());
+        let second = options.second.gradient_array.as_deref().or(of_scene);
+        let field = scalars.field_with(&mesh, second).with_context(|| path.display().to_string())?;
         options.check(&field)?;
         (scalars, field)
     };
@@ -282,6 +289,9 @@ pub(crate) fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut 
             scene
         }
     };
+    if options.second.is_given() {
+        scene.transfer = options.second.apply(scene.transfer, &mesh, &tetrahedra, &field)?;
+    }
     scene.size = options.size.unwrap_or(scene.size);
     if from_file {
         scene.camera = options.camera.apply(scene.camera);
@@ -305,6 +315,9 @@ pub(crate) fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut 
     }
     if let (Some((color, opacity)), false) = (options.nan_color, solid) {
         let (transfer, blend) = (&scene.transfer, scene.blend);
+        if !transfer.is_of_one_variable() {
+            bail!("--nan-color: the scene has a second variable or light, of which missing values have none");
+        }
         let shown = missing::shown(&mesh, &tetrahedra, &scalars, transfer, blend, color, opacity)?;
         if let Some(shown) = shown {
             (field, scene.transfer) = (shown.field, shown.transfer);
@@ -420,6 +433,11 @@ impl Request {
             bail!("a maximum along rays has no variants to compare: --blend composite draws the scene's integral");
         }
         Ok(choice.table)
+    }
+
+    /// What was asked for, for messages.
+    pub(crate) fn name(&self) -> &Path {
+        &self.input
     }
 
     /// Whether no array is asked for, and there is none to choose.

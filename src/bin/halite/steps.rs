@@ -44,7 +44,7 @@ pub(crate) fn draw(options: &Options, given: Option<Scene>, renderer: &mut Rende
 fn range_of_all(request: &Request, count: usize) -> Result<Option<[f64; 2]>> {
     let (mut all, mut scalars) = (None::<[f64; 2]>, None);
     for step in 0..count {
-        let (mesh, _) = input::mesh(&request.input, Some(Time::Step(step)))?;
+        let (mesh, _) = input::mesh(&request.input, Some(Time::Step(step)), false)?;
         if request.has_no_choice(&mesh) {
             return Ok(None);
         }

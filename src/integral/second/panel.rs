@@ -1,0 +1,372 @@
+//! Pieces in which everything is smooth, as panels of Gauss's collocation with four nodes.
+//!
+//! The light of a segment solves C′ = q e^{−T}, T′ = τ. With the nodes of Gauss's rule, and T at each of them from the
+//! polynomial through τ at all, one panel is a step of the implicit Runge–Kutta method of order 8 (Butcher, Implicit
+//! Runge–Kutta Processes, 1964), which for this system takes no iteration.
+
+use super::{Bounded, Gathered, Ready, Scratch, Second, Segment, closed};
+use crate::transfer::shading::{Origin, Shade};
+use crate::transfer::{Convention, bivariate::Shape, interpolate};
+use glam::DVec3;
+
+/// Nodes of a panel.
+const NODES: usize = 4;
+/// The greatest depth of a panel.
+const DEEPEST: f64 = 1.5;
+/// By how many σ a Gaussian's argument moves in a panel, and by how many radians a sinusoid's, at most.
+const STEP: [f64; 2] = [1.2, 1.5];
+/// By what factor the argument of a power or a logarithm changes between the nodes of a panel at most.
+const FACTOR: f64 = 2.0;
+/// By what angle a normal turns in a panel at most; for highlights this over the root of their power.
+const ANGLES: [f64; 2] = [0.35, 1.2];
+/// The shortest panels that are halved as they bend, and those that are shortened as they are deep, as shares of a segment.
+const SHORTEST: f64 = 1e-7;
+/// See [`SHORTEST`].
+const THINNEST: f64 = 1e-14;
+/// Transmittance of a segment below which f32 tells nothing from nothing.
+const DARK: f64 = 1e-12;
+/// Places of a segment that are one.
+const SAME: f64 = 1e-12;
+
+/// Gauss's rule on [0, 1], and the integrals of the polynomials through its nodes from 0 to each of them.
+#[derive(Debug, Clone)]
+pub(super) struct Rule {
+    nodes: [f64; NODES],
+    weights: [f64; NODES],
+    to_node: [[f64; NODES]; NODES],
+}
+
+impl Default for Rule {
+    fn default() -> Self {
+        let root = |sign: f64| (3.0 / 7.0 + sign * 2.0 / 7.0 * 1.2_f64.sqrt()).sqrt();
+        let nodes = [-root(1.0), -root(-1.0), root(-1.0), root(1.0)].map(|x| 0.5 + 0.5 * x);
+        let weights = [-1.0, 1.0, 1.0, -1.0].map(|sign: f64| (18.0 + sign * 30_f64.sqrt()) / 72.0);
+        let polynomial = |j: usize, x: f64| -> f64 {
+            let factor = |k: usize| (x - nodes[k]) / (nodes[j] - nodes[k]);
+            (0..NODES).filter(|&k| k != j).map(factor).product()
+        };
+        // The rule itself is exact for them.
+        let integral = |i: usize, j: usize| -> f64 {
+            (0..NODES).map(|k| nodes[i] * weights[k] * polynomial(j, nodes[i] * nodes[k])).sum()
+        };
+        let to_node = std::array::from_fn(|i| std::array::from_fn(|j| integral(i, j)));
+        Rule { nodes, weights, to_node }
+    }
+}
+
+/// A piece of a segment in which nothing jumps or turns, and what is linear in it, at its ends.
+struct Piece<'a> {
+    ends: [f64; 2],
+    /// Red, green, blue and opacity of the functions of s.
+    knots: [[f64; 4]; 2],
+    factor: [f64; 2],
+    active: &'a [usize],
+    /// Nothing is absorbed in it.
+    clear: bool,
+}
+
+/// What a node emits and absorbs over the whole segment: red, green, blue and depth.
+#[derive(Clone, Copy, Default)]
+struct Node {
+    density: [f64; 4],
+    /// What is left of 1 by the greatest opacity, where its logarithm counts.
+    left: f64,
+}
+
+/// Where beyond `u` a linear function, `at` where it is 0 and with such a `rise`, has `value`.
+fn pass(at: f64, rise: f64, value: f64, u: f64) -> f64 {
+    let place = (value - at) / rise;
+    if place > u + SAME { place } else { f64::INFINITY }
+}
+
+/// Where beyond `u` it next is a whole number from `least` to `most`.
+fn pass_whole(at: f64, rise: f64, [least, most]: [f64; 2], u: f64) -> f64 {
+    let now = at + rise * u;
+    let next = if rise > 0.0 {
+        ((now + 1e-9).floor() + 1.0).max(least)
+    } else if rise < 0.0 {
+        ((now - 1e-9).ceil() - 1.0).min(most)
+    } else {
+        return f64::INFINITY;
+    };
+    if (least..=most).contains(&next) { pass(at, rise, next, u) } else { f64::INFINITY }
+}
+
+/// Where beyond `u` it next passes a knot.
+fn pass_knot<T>(knots: &[(f64, T)], at: f64, rise: f64, u: f64) -> f64 {
+    let now = at + rise * (u + SAME);
+    let next = if rise > 0.0 {
+        knots.get(knots.partition_point(|k| k.0 <= now))
+    } else if rise < 0.0 {
+        knots[..knots.partition_point(|k| k.0 < now)].last()
+    } else {
+        None
+    };
+    next.map_or(f64::INFINITY, |k| pass(at, rise, k.0, u))
+}
+
+impl Second {
+    /// Adds the part of `segment` between `ends`, where the widgets of `scratch.active` are.
+    pub(super) fn smooth(&self, segment: &Segment, ends: [f64; 2], scratch: &mut Scratch, light: &mut Gathered<f64>) {
+        let mut u = ends[0];
+        while u < ends[1] && light.through > DARK {
+            let next = self.next(segment, &scratch.active, u).min(ends[1]);
+            let piece = self.piece(segment, [u, next], &scratch.active);
+            if self.direct.is_some() || !piece.clear {
+                scratch.panels += self.panels(segment, &piece, light);
+            }
+            u = next;
+        }
+    }
+
+    /// Where beyond `u` the function next turns or jumps.
+    fn next(&self, segment: &Segment, active: &[usize], u: f64) -> f64 {
+        let [at, rise] = [segment.at, segment.rise];
+        let mut next = pass_knot(&self.factor, at[1], rise[1], u);
+        match &self.source {
+            Ready::Widgets(widgets) => {
+                for Bounded { widget, turns, .. } in active.iter().map(|&i| &widgets[i]) {
+                    let Some((wave, _)) = closed::wave(&widget.shape) else { continue };
+                    let (p, d) = (wave.phase(at), wave.rise(rise));
+                    let far = [f64::NEG_INFINITY, f64::INFINITY];
+                    next = turns.iter().fold(next, |next, turn| next.min(pass_whole(p - turn, d, far, u)));
+                }
+            }
+            Ready::Table(table) => {
+                let (first, last) = (table.place(at), table.place(segment.values(1.0)));
+                for k in 0..2 {
+                    let most = table.size()[k] as f64 - 1.0;
+                    next = next.min(pass_whole(first[k], last[k] - first[k], [0.0, most], u));
+                }
+            }
+            Ready::Scalar { color, opacity, .. } => {
+                next = next.min(pass_knot(color, at[0], rise[0], u)).min(pass_knot(opacity, at[0], rise[0], u));
+            }
+        }
+        if let Some(shading) = &self.shading {
+            let Segment { vector, turn, place, along, length, .. } = *segment;
+            if shading.silhouette().is_some() || self.lights.iter().any(|l| l.origin == Origin::Headlight) {
+                next = next.min(pass(vector.dot(along), turn.dot(along), 0.0, u));
+            }
+            for light in &self.lights {
+                match light.origin {
+                    Origin::Headlight => {}
+                    Origin::Direction(to) => next = next.min(pass(vector.dot(to), turn.dot(to), 0.0, u)),
+                    Origin::Position(p) => {
+                        let (to, step) = (p - place, along * -length);
+                        let (a, b, c) = (turn.dot(step), vector.dot(step) + turn.dot(to), vector.dot(to));
+                        next = roots(a, b, c).into_iter().filter(|&x| x > u + SAME).fold(next, f64::min);
+                    }
+                }
+            }
+        }
+        next
+    }
+
+    /// What is linear between two such places.
+    fn piece<'a>(&self, segment: &Segment, ends: [f64; 2], active: &'a [usize]) -> Piece<'a> {
+        // From places inside: at the ends is what either side has.
+        let outward = |f: &dyn Fn([f64; 2]) -> f64| {
+            let [p, q] = [0.25, 0.75].map(|x| f(segment.values(ends[0] + (ends[1] - ends[0]) * x)));
+            [p - (q - p) * 0.5, q + (q - p) * 0.5].map(|x| x.max(0.0))
+        };
+        let mut knots = [[0.0; 4]; 2];
+        if let Ready::Scalar { color, opacity, clamp } = &self.source {
+            for k in 0..4 {
+                let values = outward(&|[s, _]| match k {
+                    3 => interpolate(opacity, s, *clamp, |a| *a),
+                    _ => interpolate(color, s, *clamp, |c| c[k]),
+                });
+                (knots[0][k], knots[1][k]) = (values[0], values[1]);
+            }
+        }
+        let factor = if self.factor.is_empty() {
+            [1.0; 2]
+        } else {
+            outward(&|[_, g]| interpolate(&self.factor, g, true, |h| *h))
+        };
+        let clear = matches!(self.source, Ready::Scalar { .. }) && knots[0][3] == 0.0 && knots[1][3] == 0.0;
+        Piece { ends, knots, factor, active, clear: clear || factor == [0.0; 2] }
+    }
+
+    /// Adds panels until the piece is done, and counts them.
+    fn panels(&self, segment: &Segment, piece: &Piece, light: &mut Gathered<f64>) -> u64 {
+        let [begin, end] = piece.ends;
+        let longest = (end - begin) / ((end - begin) * self.rate(segment, piece)).ceil().max(1.0);
+        let (mut u, mut h, mut count) = (begin, longest, 0);
+        while u < end && light.through > DARK {
+            let left = end - u;
+            // No sliver is left to the last.
+            h = if left < h * (1.0 + SAME) {
+                left
+            } else if left < 2.0 * h {
+                left / 2.0
+            } else {
+                h
+            };
+            let nodes = self.rule.nodes.map(|x| self.node(segment, piece, u + h * x));
+            let depth: f64 = (0..NODES).map(|i| self.rule.weights[i] * nodes[i].density[3]).sum::<f64>() * h;
+            if depth > DEEPEST && h > THINNEST {
+                h *= (1.0 / depth).clamp(0.01, 0.6);
+                continue;
+            }
+            if h > SHORTEST && !self.is_tame(segment, &nodes, [u, u + h]) {
+                h *= 0.5;
+                continue;
+            }
+            let (mut emitted, mut absorbed) = ([0.0; 3], 0.0);
+            for i in 0..NODES {
+                let before: f64 = (0..NODES).map(|j| self.rule.to_node[i][j] * nodes[j].density[3]).sum::<f64>() * h;
+                let seen = (-before).exp() * self.rule.weights[i] * h;
+                for (sum, q) in emitted.iter_mut().zip(nodes[i].density) {
+                    *sum += seen * q;
+                }
+                absorbed += seen * nodes[i].density[3];
+            }
+            let opacity = -(-depth).exp_m1();
+            // What one colour emits is that times the opacity, whatever the nodes miss of it.
+            let right = if self.direct.is_none() && absorbed > 0.0 { opacity / absorbed } else { 1.0 };
+            light.add(emitted.map(|c| c * right), opacity);
+            count += 1;
+            u += h;
+            h = (2.0 * h).min(longest);
+        }
+        count
+    }
+
+    /// Panels per unit of u that the bends of widgets ask for.
+    fn rate(&self, segment: &Segment, piece: &Piece) -> f64 {
+        let Ready::Widgets(widgets) = &self.source else { return 0.0 };
+        let rate = |&i: &usize| match &widgets[i].widget.shape {
+            Shape::Gaussian { sigma, .. } => (segment.rise[0] / sigma[0]).hypot(segment.rise[1] / sigma[1]) / STEP[0],
+            shape => closed::wave(shape)
+                .map_or(0.0, |(wave, turn)| (wave.rise(segment.rise) * turn.radians()).abs() / STEP[1]),
+        };
+        piece.active.iter().map(rate).fold(0.0, f64::max)
+    }
+
+    /// Whether what is no polynomial changes little enough between two places.
+    fn is_tame(&self, segment: &Segment, nodes: &[Node; NODES], [from, to]: [f64; 2]) -> bool {
+        let [least, most] = nodes.iter().fold([f64::MAX, 0.0], |[l, m], n| [n.left.min(l), n.left.max(m)]);
+        if self.convention == Convention::Opacity && most > FACTOR * least {
+            return false;
+        }
+        let Some(shading) = &self.shading else { return true };
+        let [a, b] = [from, to].map(|u| segment.vector + segment.turn * u);
+        let power = shading.shade().filter(|s| s.specular > 0.0).map_or(1.0, |s| s.power);
+        let angle = ANGLES[0].min(ANGLES[1] / power.max(1.0).sqrt());
+        let product = a.length() * b.length();
+        if product > self.flat * self.flat && a.dot(b) < angle.cos() * product {
+            return false;
+        }
+        if shading.silhouette().is_some_and(|p| p.fract() != 0.0) {
+            let edge = |u: f64| {
+                let v = segment.vector + segment.turn * u;
+                (1.0 - v.dot(segment.along).abs() / v.length().max(self.flat)).max(1e-5)
+            };
+            let edges = self.rule.nodes.map(|x| edge(from + (to - from) * x));
+            let [least, most] = edges.iter().fold([f64::MAX, 0.0], |[l, m], e| [e.min(l), e.max(m)]);
+            return most <= FACTOR * least;
+        }
+        true
+    }
+
+    /// What is at `u`.
+    fn node(&self, segment: &Segment, piece: &Piece, u: f64) -> Node {
+        let share = (u - piece.ends[0]) / (piece.ends[1] - piece.ends[0]);
+        let linear = |ends: [f64; 2]| ends[0] + (ends[1] - ends[0]) * share;
+        let absorbing = segment.length / self.unit;
+        let shining = self.direct.map(|e| e * segment.length);
+        let (mut emitted, mut white, mut depth, mut most) = (DVec3::ZERO, 0.0, 0.0, 0.0_f64);
+        let mut add = |color: DVec3, a: f64| {
+            let tau = self.extinction(a) * absorbing;
+            let q = shining.unwrap_or(tau);
+            emitted += color * q;
+            white += q;
+            depth += tau;
+            most = most.max(a);
+        };
+        match &self.source {
+            Ready::Widgets(widgets) => {
+                for Bounded { widget, .. } in piece.active.iter().map(|&i| &widgets[i]) {
+                    add(widget.color.into(), widget.height(segment.values(u)));
+                }
+            }
+            Ready::Table(table) => {
+                let [r, g, b, a] = table.at(segment.values(u));
+                add(DVec3::new(r, g, b), a);
+            }
+            Ready::Scalar { .. } => {
+                let [r, g, b, a] = [0, 1, 2, 3].map(|k| linear([piece.knots[0][k], piece.knots[1][k]]));
+                add(DVec3::new(r, g, b), a);
+            }
+        }
+        let mut factor = linear(piece.factor);
+        if let Some(shading) = &self.shading {
+            let vector = segment.vector + segment.turn * u;
+            let length = vector.length();
+            let normal = (length > self.flat).then(|| vector / length);
+            if let (Some(p), Some(n)) = (shading.silhouette(), normal) {
+                factor *= (1.0 - n.dot(segment.along).abs()).max(0.0).powf(p);
+            }
+            if let Some(shade) = shading.shade() {
+                let place = segment.place + segment.along * (segment.length * u);
+                emitted = self.lit(shade, normal, place, segment.along, emitted, white);
+            }
+        }
+        if self.direct.is_none() {
+            emitted *= factor;
+        }
+        Node { density: [emitted.x, emitted.y, emitted.z, depth * factor], left: (1.0 - most).max(1e-9) }
+    }
+
+    /// The light that comes back of the colours `emitted`, whose white would be `white`.
+    fn lit(
+        &self,
+        shade: &Shade,
+        normal: Option<DVec3>,
+        place: DVec3,
+        along: DVec3,
+        emitted: DVec3,
+        white: f64,
+    ) -> DVec3 {
+        let Some(normal) = normal else { return emitted * shade.ambient };
+        let side = |x: f64| if shade.two_sided { x.abs() } else { x.max(0.0) };
+        let (mut diffuse, mut specular) = (DVec3::ZERO, DVec3::ZERO);
+        for light in &self.lights {
+            let intensity = DVec3::from(light.color) * light.intensity;
+            let (falls, to) = match light.origin {
+                Origin::Headlight => (side(-normal.dot(along)), None),
+                Origin::Direction(to) => (side(normal.dot(to)), Some(to)),
+                Origin::Position(p) => {
+                    let to = (p - place).normalize_or_zero();
+                    (side(normal.dot(to)), Some(to))
+                }
+            };
+            if falls <= 0.0 {
+                continue;
+            }
+            diffuse += intensity * falls;
+            // Half way to a headlight is the way to it.
+            let shines = to.map_or(falls, |to| {
+                let half = to - along;
+                let length = half.length();
+                if length > 1e-12 { side(normal.dot(half)) / length } else { 0.0 }
+            });
+            if shade.specular > 0.0 && (to.is_none() || shines > 0.0) {
+                specular += intensity * shines.powf(shade.power);
+            }
+        }
+        emitted * (shade.ambient + shade.diffuse * diffuse) + specular * (shade.specular * white)
+    }
+}
+
+/// The real roots of a x² + b x + c.
+fn roots(a: f64, b: f64, c: f64) -> [f64; 2] {
+    let d = b * b - 4.0 * a * c;
+    if d < 0.0 {
+        return [f64::NAN; 2];
+    }
+    let q = -0.5 * (b + d.sqrt().copysign(b));
+    [q / a, c / q]
+}

@@ -1,0 +1,233 @@
+//! Frames whose transfer function has a second variable, or light: what they need besides the field, kept as long as it
+//! holds. The walk on the CPU draws them.
+
+use super::{Drawn, Loaded, Progress, Renderer, Stats, missing, ms};
+use crate::error::{Error, Result};
+use crate::field::gradient::length;
+use crate::field::normal::MOST;
+use crate::field::{Association, Field, Gradient, Kind, Normal};
+use crate::geometry::Values;
+use crate::image::Image;
+use crate::integral::second::{LONGEST, Second, places};
+use crate::transfer::TransferFunction;
+use crate::transfer::bivariate::{Bivariate, Source};
+use crate::traverse::cpu::render_two;
+use crate::view::{Blend, View};
+use std::time::Instant;
+
+/// By how much less of the range of values must count for other maps to be better.
+const BETTER: f64 = 4.0;
+
+/// What such frames need, as far as it was made.
+#[derive(Debug, Default)]
+pub(super) struct Extra {
+    /// The gradient in world units, for the field and the points of now; the scale that it was made under.
+    gradient: Option<Gradient>,
+    values: Option<Ready>,
+    function: Option<Second>,
+}
+
+/// Values, and how they are mapped: s and g.
+#[derive(Debug)]
+struct Ready {
+    normal: [Normal; 2],
+    values: TwoOrFive,
+}
+
+/// The values of a frame.
+#[derive(Debug)]
+pub(super) enum TwoOrFive {
+    /// s and g.
+    Two(Values<2>),
+    /// Those and the gradient, of which the longest is 1.
+    Five(Values<5>),
+}
+
+impl Renderer {
+    /// Draws a frame with a second variable, or light, by the walk on the CPU.
+    pub(super) fn render_second(&mut self, view: &View, progress: &Progress) -> Result<Image> {
+        let start = Instant::now();
+        let mesh = self.mesh.as_mut().ok_or_else(|| missing("mesh"))?;
+        if !mesh.connected {
+            self.pool.install(|| mesh.geometry.connect());
+            mesh.connected = true;
+        }
+        let field = self.field.as_ref().ok_or_else(|| missing("field"))?.field();
+        let transfer = self.transfer.as_ref().ok_or_else(|| missing("transfer function"))?;
+        let extra = &mut self.extra;
+        let mesh = &*mesh;
+        let drawn = self.pool.install(|| {
+            let (values, second) = extra.prepare(mesh, field, transfer, view.blend())?;
+            Ok::<_, Error>(draw(mesh, values, second, view, progress))
+        });
+        let Drawn { pixels, counts, .. } = drawn?;
+        self.stats = Stats {
+            integral: "adaptive".into(),
+            table_ms: 0.0,
+            table_bytes: 0,
+            knots_per_cell: 0.0,
+            steps: counts.steps,
+            repaired_rays: counts.repaired,
+            cpu_rays: 0,
+            panels: counts.panels,
+            device_bytes: mesh.geometry.bytes() + self.extra.bytes(),
+            uploaded_bytes: 0,
+            device_ms: None,
+            projection: None,
+            sweep: None,
+            frame_ms: ms(start),
+            ..std::mem::take(&mut self.stats)
+        };
+        Ok(Image { size: view.size(), pixels })
+    }
+}
+
+impl TwoOrFive {
+    fn bytes(&self) -> u64 {
+        match self {
+            TwoOrFive::Two(v) => v.bytes(),
+            TwoOrFive::Five(v) => v.bytes(),
+        }
+    }
+}
+
+impl Extra {
+    /// Points have moved, or the field is another.
+    pub(super) fn forget_field(&mut self) {
+        *self = Self::default();
+    }
+
+    /// The transfer function is another.
+    pub(super) fn forget_function(&mut self) {
+        self.function = None;
+    }
+
+    /// Bytes held.
+    pub(super) fn bytes(&self) -> u64 {
+        self.gradient.as_ref().map_or(0, Gradient::bytes) + self.values.as_ref().map_or(0, |v| v.values.bytes())
+    }
+
+    /// Makes what is missing to draw `field` on `mesh` with `transfer`, on the current rayon pool.
+    ///
+    /// # Errors
+    /// [`Error::Field`] if the field has no gradient, or more than one component; [`Error::Render`] for a maximum;
+    /// [`Error::NoMemory`].
+    pub(super) fn prepare(
+        &mut self,
+        mesh: &Loaded,
+        field: &Field,
+        transfer: &TransferFunction,
+        blend: Blend,
+    ) -> Result<(&TwoOrFive, &Second)> {
+        if blend == Blend::Maximum {
+            let what = "a maximum along rays knows neither a second variable nor light; a composite does";
+            return Err(Error::Render(what.into()));
+        }
+        if field.kind() != Kind::Scalar {
+            let what = "a second variable and light are for fields of one component";
+            return Err(Error::Field(what.into()));
+        }
+        let lit = transfer.shading().is_some();
+        self.check_cells(field, transfer)?;
+        let needs = lit || transfer.bivariate().is_some() && field.second().is_none();
+        if needs && self.gradient.is_none() && field.association() == Association::Point {
+            let count = mesh.points + mesh.tetrahedra.added.len();
+            let points = mesh.geometry.points_of_mesh(&mesh.tetrahedra, count);
+            self.gradient = Some(Gradient::new(&points, &mesh.tetrahedra, field)?);
+        }
+        // Gradients are per normalised length so far.
+        let scale = mesh.geometry.scale;
+        let lengths = self.gradient.as_ref().map_or([0.0; 2], |g| g.range().map(|l| l * scale));
+        let ranges = [field.range(0), field.second().map_or(lengths, |g| g.range(0))];
+        let wanted = places(transfer, LONGEST / scale);
+        let short = [field.is_short(), field.second().is_some_and(Field::is_short)];
+        let normal = [0, 1].map(|k| {
+            let [lo, hi] = [ranges[k][0].max(wanted[k][0]), ranges[k][1].min(wanted[k][1])];
+            let normal = if lo <= hi { Normal::new(lo, hi) } else { Normal::new(ranges[k][0], ranges[k][1]) };
+            // What f32 holds as it is, a power of two does not round.
+            if short[k] {
+                Normal { mid: 0.0, half: (normal.mid.abs() + normal.half).log2().ceil().exp2() }
+            } else {
+                normal
+            }
+        });
+        let good = |ready: &Ready| {
+            let close = |old: Normal, new: Normal| {
+                old.half <= BETTER * new.half && (old.mid - new.mid).abs() + new.half <= old.half * (1.0 + 1e-9)
+            };
+            matches!(ready.values, TwoOrFive::Five(_)) == lit && (0..2).all(|k| close(ready.normal[k], normal[k]))
+        };
+        if !self.values.as_ref().is_some_and(good) {
+            self.function = None;
+            let values = self.gather(mesh, field, normal, lit);
+            self.values = Some(Ready { normal, values });
+        }
+        let Some(ready) = &self.values else { return Err(Error::Render("there are no values to draw".into())) };
+        let function = self
+            .function
+            .get_or_insert_with(|| Second::new(transfer, ready.normal, mesh.geometry.centre, mesh.geometry.scale));
+        Ok((&ready.values, function))
+    }
+
+    /// Refuses what fields of cells have not.
+    fn check_cells(&self, field: &Field, transfer: &TransferFunction) -> Result<()> {
+        if field.association() == Association::Point {
+            return Ok(());
+        }
+        let widgets = |b: &Bivariate| matches!(b.source(), Source::Widgets(_)) && b.gradient_opacity().is_none();
+        let fits =
+            transfer.shading().is_none() && (field.second().is_some() || transfer.bivariate().is_none_or(widgets));
+        if fits {
+            return Ok(());
+        }
+        Err(Error::Field(
+            "values of cells have no gradient, as they are constant inside: light, and functions of the gradient's length, \
+             need an array of points"
+                .into(),
+        ))
+    }
+
+    /// The values in the order of the mesh.
+    fn gather(&self, mesh: &Loaded, field: &Field, normal: [Normal; 2], lit: bool) -> TwoOrFive {
+        let (geometry, tetrahedra) = (&mesh.geometry, &mesh.tetrahedra);
+        let scale = geometry.scale;
+        let vector = |p: u32| self.gradient.as_ref().map(|g| g.vectors()[p as usize]).unwrap_or_default();
+        if field.association() == Association::Cell {
+            let pair = |c: usize| {
+                let g = field.second().map_or(0.0, |g| g.value(c));
+                [normal[0].bounded(field.value(c), MOST), normal[1].bounded(g, MOST)]
+            };
+            return TwoOrFive::Two(Values::of_cells(geometry, tetrahedra, pair));
+        }
+        let own = field.len();
+        let added = |of: &Field| tetrahedra.added_values(1, |i| of.value(i));
+        let (of_s, of_g) = (added(field), field.second().map(added));
+        let at = |of: &Field, added: &[f64], p: u32| {
+            (p as usize).checked_sub(own).map_or_else(|| of.value(p as usize), |i| added[i])
+        };
+        let pair = |p: u32| {
+            let g = match (field.second(), &of_g) {
+                (Some(of), Some(added)) => at(of, added, p),
+                _ => length(vector(p)) * scale,
+            };
+            [normal[0].bounded(at(field, &of_s, p), MOST), normal[1].bounded(g, MOST)]
+        };
+        if !lit {
+            return TwoOrFive::Two(Values::of_points(geometry, tetrahedra, pair));
+        }
+        let longest = self.gradient.as_ref().map_or(1.0, |g| g.range()[1]).max(f64::MIN_POSITIVE);
+        TwoOrFive::Five(Values::of_points(geometry, tetrahedra, |p| {
+            let ([s, g], v) = (pair(p), vector(p) / longest);
+            [s, g, v.x as f32, v.y as f32, v.z as f32]
+        }))
+    }
+}
+
+/// Draws a frame on the current rayon pool.
+pub(super) fn draw(mesh: &Loaded, values: &TwoOrFive, second: &Second, view: &View, progress: &Progress) -> Drawn {
+    let (image, counts) = match values {
+        TwoOrFive::Two(v) => render_two(&mesh.geometry, v, second, view, progress),
+        TwoOrFive::Five(v) => render_two(&mesh.geometry, v, second, view, progress),
+    };
+    Drawn { pixels: image.pixels, counts, ..Drawn::default() }
+}

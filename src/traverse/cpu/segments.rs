@@ -1,0 +1,120 @@
+//! What a walk hands its segments to: integrals of one variable, or of two.
+
+use super::least_light;
+use crate::integral::second::{Scratch, Second, Segment};
+use crate::integral::{Batch, Integral, Light};
+use crate::real::Real;
+use glam::DVec3;
+
+/// What integrates the segments of rays, one ray after another.
+pub(super) trait Segments<const N: usize> {
+    /// What values along a ray are rounded to.
+    type Value: Real;
+    /// A ray begins, from `origin` along a direction of length 1, in normalised coordinates.
+    fn begin(&mut self, origin: DVec3, along: DVec3);
+    /// Takes a segment with these values at its ends, between two places on the ray.
+    fn add(&mut self, front: &[Self::Value; N], back: &[Self::Value; N], t: [f64; 2], light: &mut Light<f32>);
+    /// All of the ray is to be in `light`.
+    fn end(&mut self, light: &mut Light<f32>);
+    /// Transmittance below which nothing behind counts.
+    fn least_light(&self) -> f32;
+    /// Panels so far.
+    fn panels(&self) -> u64;
+}
+
+/// Segments of one variable, or of values with functions of their own.
+pub(super) struct One<'a> {
+    integral: Integral<'a>,
+    batch: Batch,
+}
+
+impl<'a> One<'a> {
+    pub(super) fn new(integral: Integral<'a>) -> Self {
+        One { integral, batch: Batch::default() }
+    }
+}
+
+impl<const N: usize> Segments<N> for One<'_> {
+    type Value = f32;
+
+    #[inline(always)]
+    fn begin(&mut self, _: DVec3, _: DVec3) {
+        self.batch.clear();
+    }
+
+    #[inline(always)]
+    fn add(&mut self, front: &[f32; N], back: &[f32; N], [from, to]: [f64; 2], light: &mut Light<f32>) {
+        let length = (to - from) as f32;
+        match self.integral.table {
+            None => self.batch.add(self.integral.exact, front, back, length, light),
+            Some(table) => table.add(self.integral.exact, front[N - 1], back[N - 1], length, light),
+        }
+    }
+
+    #[inline(always)]
+    fn end(&mut self, light: &mut Light<f32>) {
+        self.batch.flush(self.integral.exact.direct, light);
+    }
+
+    #[inline(always)]
+    fn least_light(&self) -> f32 {
+        least_light(self.integral.exact.direct)
+    }
+
+    fn panels(&self) -> u64 {
+        0
+    }
+}
+
+/// Segments of two variables: s and g; or with the gradient, of five.
+pub(super) struct Two<'a> {
+    second: &'a Second,
+    scratch: Scratch,
+    origin: DVec3,
+    along: DVec3,
+}
+
+impl<'a> Two<'a> {
+    pub(super) fn new(second: &'a Second) -> Self {
+        Two { second, scratch: Scratch::default(), origin: DVec3::ZERO, along: DVec3::Z }
+    }
+}
+
+impl<const N: usize> Segments<N> for Two<'_> {
+    // The logarithm of the opacity convention tells values apart that are closer than f32 does.
+    type Value = f64;
+
+    fn begin(&mut self, origin: DVec3, along: DVec3) {
+        (self.origin, self.along) = (origin, along);
+    }
+
+    fn add(&mut self, front: &[f64; N], back: &[f64; N], [from, to]: [f64; 2], light: &mut Light<f32>) {
+        if front.iter().chain(back).all(|v| v.is_finite()) {
+            let [values, ends] = [front, back].map(|v| self.second.own([v[0], v[1]]));
+            let vector = |v: &[f64; N]| match v[..] {
+                [_, _, x, y, z] => DVec3::new(x, y, z),
+                _ => DVec3::ZERO,
+            };
+            let segment = Segment {
+                at: values,
+                rise: [ends[0] - values[0], ends[1] - values[1]],
+                vector: vector(front),
+                turn: vector(back) - vector(front),
+                place: self.origin + self.along * from,
+                along: self.along,
+                length: to - from,
+            };
+            self.second.add(&segment, &mut self.scratch, light);
+        }
+    }
+
+    fn end(&mut self, _: &mut Light<f32>) {}
+
+    fn least_light(&self) -> f32 {
+        least_light(self.second.is_direct())
+    }
+
+    fn panels(&self) -> u64 {
+        self.scratch.panels
+    }
+}
