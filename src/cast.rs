@@ -2,16 +2,14 @@
 //!
 //! Each ray goes from voxel to voxel of the dual grid, the cells between sample points, by a digital differential analyser:
 //! where it crosses the planes of an axis is computed from the axis's own table, never added up, so nothing drifts, and
-//! ties are steps of no length. Inside a voxel the trilinear field is a cubic along the ray (`cubic`), which is split where
-//! it meets a knot of the transfer function; each piece is integrated in f64 (`piece`). Cell data are constant in a voxel.
+//! ties are steps of no length. Inside a voxel the trilinear field is a cubic along the ray (`integral::cubic`), which is
+//! split where it meets a knot of the transfer function; each piece is integrated in f64. Cell data are constant in a voxel.
 //! Blocks of voxels that the function makes empty are passed without a look at their values (`volume`).
 //!
 //! It is the exact counterpart of the ray caster of El Hajjar, Marchesin, Dischler & Mongenet (Second Order Pre-integrated
 //! Volume Rendering, 2008), which follows such a field by quadratic polynomials: their orders are there by name
 //! ([`Reconstruction`]). It runs on the CPU.
 
-mod cubic;
-mod piece;
 mod ray;
 pub(crate) mod reconstruction;
 mod volume;

@@ -7,10 +7,12 @@
 #![allow(clippy::needless_pass_by_value, reason = "the bridge hands structs over by value")]
 #![allow(unreachable_pub, unused_qualifications, reason = "cxx makes names of its own public, and says where they are")]
 
+mod grids;
 mod numbers;
 
 use crate::error::{Error, Result};
 use crate::field::{Association, Component, Field};
+use crate::grid::Grid;
 use crate::host::{Log, Session, carried, guard, named};
 use crate::image::{Backdrop, Image};
 use crate::integral::Choice;
@@ -22,6 +24,7 @@ use crate::transfer::{Convention, TransferFunction};
 use crate::view::{Blend, Camera, ClippingPlane, DepthBuffer, DepthKind, Projection, View};
 use bridge::{ArrayInfo, CameraSpec, CellCount, FieldSpec, IntegralSpec, Numbers, Stats, TransferSpec, Type, ViewSpec};
 use glam::{DMat4, DVec3};
+use grids::{add_grid_array, new_grid, set_grid};
 use numbers::{cast, indices, point_ids, triples, values};
 use std::path::Path;
 
@@ -144,6 +147,7 @@ mod bridge {
 
     extern "Rust" {
         type Log;
+        type Grid;
         type Mesh;
         type Session;
 
@@ -154,6 +158,8 @@ mod bridge {
         fn new_mesh(points: Numbers, types: &[u8], offsets: Numbers, connectivity: Numbers) -> Result<Box<Mesh>>;
         fn add_polyhedra(mesh: &mut Mesh, cells: Numbers, faces: Numbers, points: Numbers) -> Result<()>;
         fn add_array(mesh: &mut Mesh, name: &str, of_cells: bool, components: usize, numbers: Numbers) -> Result<()>;
+        fn new_grid(x: Numbers, y: Numbers, z: Numbers, origin: [f64; 3], direction: [f64; 9]) -> Result<Box<Grid>>;
+        fn add_grid_array(grid: &mut Grid, name: &str, of_cells: bool, n: usize, numbers: Numbers) -> Result<()>;
         fn arrays(mesh: &Mesh) -> Result<Vec<ArrayInfo>>;
         fn array_values(mesh: &Mesh, index: usize) -> Result<Vec<f64>>;
         fn cell_counts(mesh: &Mesh) -> Result<Vec<CellCount>>;
@@ -165,6 +171,7 @@ mod bridge {
         fn new_session(threads: usize, device: &str, engine: &str, log: &Log) -> Result<Box<Session>>;
         fn set_integral(session: &mut Session, spec: IntegralSpec) -> Result<()>;
         fn set_mesh(session: &mut Session, mesh: &Mesh, matrix: [f64; 16]) -> Result<()>;
+        fn set_grid(session: &mut Session, grid: &Grid, matrix: [f64; 16]) -> Result<()>;
         fn move_points(session: &mut Session, points: Numbers, matrix: [f64; 16]) -> Result<bool>;
         fn move_mesh(session: &mut Session, mesh: &Mesh, matrix: [f64; 16]) -> Result<bool>;
         fn set_field(session: &mut Session, spec: FieldSpec, numbers: Numbers) -> Result<()>;

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::memory;
 use crate::mesh::cells::ghosts;
 use crate::mesh::{Array, Attributes, Cells, Mesh, Values, check_array, has_arrays};
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DMat4, DVec3};
 
 /// VTK's cell types of grids by the number of axes along which there is more than one point: in a regular or
 /// rectilinear grid.
@@ -195,6 +195,44 @@ impl Grid {
     /// What is known of the arrays of cells beside their values.
     pub fn cell_attributes(&self) -> &Attributes {
         &self.cell_attributes
+    }
+
+    /// Adds an array with a value for each point.
+    ///
+    /// # Errors
+    /// [`Error::Mesh`] if its length is not components × points.
+    pub fn add_point_array(&mut self, array: Array) -> Result<()> {
+        check_array("point", &array, self.point_count())?;
+        self.point_arrays.push(array);
+        Ok(())
+    }
+
+    /// Adds an array with a value for each cell.
+    ///
+    /// # Errors
+    /// [`Error::Mesh`] if its length is not components × cells.
+    pub fn add_cell_array(&mut self, array: Array) -> Result<()> {
+        check_array("cell", &array, self.cell_count())?;
+        self.cell_arrays.push(array);
+        Ok(())
+    }
+
+    /// The grid turned, or sheared, and moved.
+    ///
+    /// # Errors
+    /// [`Error::Mesh`] if `matrix` is not affine, not finite or singular.
+    pub fn transformed(mut self, matrix: DMat4) -> Result<Self> {
+        if !matrix.is_finite() || matrix.row(3).to_array() != [0.0, 0.0, 0.0, 1.0] {
+            return Err(Error::Mesh("the matrix of the grid is not affine, or not finite".into()));
+        }
+        if matrix != DMat4::IDENTITY {
+            self.origin = matrix.transform_point3(self.origin);
+            self.direction = DMat3::from_mat4(matrix) * self.direction;
+            if !self.direction.inverse().is_finite() {
+                return Err(Error::Mesh("the matrix of the grid is singular".into()));
+            }
+        }
+        Ok(self)
     }
 
     /// The grid stretched about the world's origin, by a factor for each of the world's axes.

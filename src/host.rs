@@ -1,6 +1,7 @@
 //! What a program that embeds Halite needs around a [`Renderer`]: calls that never unwind, progress reported on the
 //! caller's own thread, points under a matrix, and a log of its own.
 
+mod grid;
 mod log;
 
 pub use log::{Log, carried};
@@ -91,6 +92,7 @@ enum State {
     /// The mesh has no cell that could be seen: its pictures are empty.
     Empty,
     Mesh,
+    Grid,
 }
 
 impl Session {
@@ -176,14 +178,14 @@ impl Session {
     }
 
     /// Draws the mesh with its points moved, under another matrix. False if that cannot be, because the matrix makes a
-    /// mirror image of what was drawn, or other points are not finite than were: the mesh must then be set again.
+    /// mirror image of what was drawn, other points are not finite than were, or a grid is drawn: it must then be set again.
     ///
     /// # Errors
     /// [`Error::Mesh`] if there are not as many points as before, or the matrix is not affine or not finite.
     pub fn set_points(&mut self, points: &[DVec3], matrix: DMat4) -> Result<bool> {
         check_matrix(matrix)?;
         match self.state {
-            State::NoMesh => Ok(false),
+            State::NoMesh | State::Grid => Ok(false),
             _ if self.renderer.install(|| not_finite(points)) != self.hidden => Ok(false),
             State::Empty => Ok(true),
             State::Mesh if self.mirrored != (matrix.determinant() < 0.0) => Ok(false),

@@ -15,6 +15,7 @@
 
 mod batch;
 pub mod choice;
+pub(crate) mod cubic;
 mod knots;
 pub mod lookup;
 pub(crate) mod second;

@@ -228,6 +228,38 @@ void Mesh::addArray(const std::string& name, Association association, std::size_
   });
 }
 
+struct Grid::Inner
+{
+  rust::Box<bridge::Grid> Box;
+
+  static bridge::Grid& Of(const Grid& grid)
+  {
+    if (!grid.Data)
+    {
+      throw Error("this grid was moved elsewhere");
+    }
+    return *grid.Data->Box;
+  }
+};
+
+Grid::Grid(Numbers x, Numbers y, Numbers z, const std::array<double, 3>& origin, const std::array<double, 9>& direction)
+{
+  this->Data.reset(new Inner{
+    call([&] { return bridge::new_grid(numbers("x", x), numbers("y", y), numbers("z", z), origin, direction); }) });
+}
+
+Grid::Grid(Grid&&) noexcept = default;
+Grid& Grid::operator=(Grid&&) noexcept = default;
+Grid::~Grid() = default;
+
+void Grid::addArray(const std::string& name, Association association, std::size_t components, Numbers n)
+{
+  call([&] {
+    bridge::add_grid_array(
+      Inner::Of(*this), str(name), association == Association::Cells, components, numbers(name.c_str(), n));
+  });
+}
+
 std::vector<ArrayInfo> Mesh::arrays() const
 {
   std::vector<ArrayInfo> result;
@@ -360,6 +392,12 @@ void Renderer::setMesh(const Mesh& mesh, const Matrix* matrix)
 {
   Inner::Run(this->Data,
     [&](bridge::Session& session) { bridge::set_mesh(session, Mesh::Inner::Of(mesh), orIdentity(matrix)); });
+}
+
+void Renderer::setGrid(const Grid& grid, const Matrix* matrix)
+{
+  Inner::Run(this->Data,
+    [&](bridge::Session& session) { bridge::set_grid(session, Grid::Inner::Of(grid), orIdentity(matrix)); });
 }
 
 bool Renderer::movePoints(Numbers points, const Matrix* matrix)

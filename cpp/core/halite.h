@@ -194,6 +194,30 @@ private:
   std::unique_ptr<Inner> Data;
 };
 
+/// A regular or rectilinear grid: points at all triples of the coordinates along three axes, turned and moved; no list of cells. The
+/// field is trilinear between points, or constant in a cell.
+class HALITE_EXPORT Grid
+{
+public:
+  /// Point (i, j, k) is at origin + direction · (x[i], y[j], z[k]); i is counted fastest, then j. Coordinates are any type of number,
+  /// and ascend or descend from one to the next. `direction` is a matrix, rows one after another.
+  Grid(Numbers x, Numbers y, Numbers z, const std::array<double, 3>& origin = { 0, 0, 0 },
+    const std::array<double, 9>& direction = { 1, 0, 0, 0, 1, 0, 0, 0, 1 });
+
+  Grid(Grid&&) noexcept;
+  Grid& operator=(Grid&&) noexcept;
+  ~Grid();
+
+  /// Adds a copy of an array, in tuples of `components`. One called "vtkGhostType" says which cells and points are
+  /// left out, as in VTK.
+  void addArray(const std::string& name, Association, std::size_t components, Numbers);
+
+private:
+  friend class Renderer;
+  struct Inner;
+  std::unique_ptr<Inner> Data;
+};
+
 /// What of an array's tuples is drawn: a component, counted from 0, or one of these.
 enum Component : int
 {
@@ -324,7 +348,7 @@ struct Settings
   Log log;
 };
 
-/// Draws one mesh as often as wanted; keeps what does not change between frames. While a call is at work, all others but
+/// Draws one mesh, or grid, as often as wanted; keeps what does not change between frames. While a call is at work, all others but
 /// statistics() and the destructor throw an Error and change nothing, on this thread (from what is called back) and others.
 class HALITE_EXPORT Renderer
 {
@@ -343,13 +367,15 @@ public:
   /// Draws `mesh`, which is not needed afterwards; the field must be set again. Lengths along rays are lengths in the
   /// world.
   void setMesh(const Mesh& mesh, const Matrix* matrix = nullptr);
+  /// Draws `grid` in place of a mesh, as setMesh does. The CPU casts its rays, whatever the device and the engine are.
+  void setGrid(const Grid& grid, const Matrix* matrix = nullptr);
   /// Moves the points of the mesh, or only its matrix, and keeps all else. False if that cannot be, because the new
-  /// matrix makes a mirror image of the old one, or other points are not finite than were: then set the mesh again.
+  /// matrix makes a mirror image of the old one, other points are not finite than were, or a grid is drawn: then set it again.
   bool movePoints(Numbers points, const Matrix* matrix = nullptr);
   bool movePoints(const Mesh& mesh, const Matrix* matrix = nullptr);
   /// Draws an array of the mesh.
   void setField(const Mesh& mesh, const std::string& name, int component = 0);
-  /// Draws numbers, in tuples of `components`, one for each point or cell of the mesh.
+  /// Draws numbers, in tuples of `components`, one for each point or cell of the mesh or grid.
   void setField(const std::string& name, Association, std::size_t components, int component, Numbers);
   void setTransferFunction(const TransferFunction&);
   /// Integrates in another form from the next frame on, which waits for its table if one is named. Where the transfer

@@ -102,7 +102,7 @@ def test_print_and_settings():
     m.SetDevice("cpu")
     m.SetImageSampleDistance(0.01)
     text = str(m)
-    for word in ("Device: cpu", "Engine: auto", "Integral: exact", "OpacityConvention: Extinction", "ImageSampleDistance: 1"):
+    for word in ("Device: cpu", "Engine: auto", "Integral: exact", "OpacityConvention: ByInput", "ImageSampleDistance: 1"):
         assert word in text, word
     assert m.IsSupported(window()) and m.GetUseFloatingPointFrameBuffer()
 

@@ -23,7 +23,7 @@ std::string NameOf(vtkDataArray* array)
 
 }
 
-Content::Content(const halite::Settings& settings, vtkUnstructuredGridBase* grid, vtkDataArray* array, int cellFlag,
+Content::Content(const halite::Settings& settings, vtkDataSet* grid, vtkDataArray* array, int cellFlag,
   vtkVolume* volume, halite::OpacityConvention convention, Functions::Cache& functions)
   : Settings(settings)
   , Grid(grid)
@@ -37,12 +37,13 @@ Content::Content(const halite::Settings& settings, vtkUnstructuredGridBase* grid
   {
     this->IntegralKey << static_cast<double>(n);
   }
-  this->MeshKey << MeshView::Identity(grid);
   vtkNew<vtkMatrix4x4> placement;
   vtkHaliteCompatibility::GetMatrix(volume, placement);
   std::copy_n(placement->GetData(), 16, this->Placement.begin());
   this->PlacementKey << this->Placement;
   this->ChooseField(volume, cellFlag);
+  this->ChooseInterpolation(volume);
+  this->MeshKey << MeshView::Identity(grid) << static_cast<std::uint64_t>(this->IsNearest);
   this->ChooseFunction(volume, convention, functions);
 }
 
@@ -90,6 +91,20 @@ void Content::ChooseField(vtkVolume* volume, int cellFlag)
   }
   this->FieldKey << static_cast<std::uint64_t>(this->Array->GetMTime()) << static_cast<std::uint64_t>(ofCells)
                  << static_cast<double>(this->Component);
+}
+
+void Content::ChooseInterpolation(vtkVolume* volume)
+{
+  this->IsGrid = MeshView::IsGrid(this->Grid);
+  // VTK's mappers of images know it, those of unstructured grids do not. What is hidden is told by cells, which cells around
+  // points are not.
+  this->IsNearest = this->IsGrid && this->Association == halite::Association::Points &&
+    volume->GetProperty()->GetInterpolationType() == VTK_NEAREST_INTERPOLATION && !MeshView::HasGhosts(this->Grid);
+  if (this->IsNearest)
+  {
+    this->Association = halite::Association::Cells;
+  }
+  this->FieldKey << static_cast<std::uint64_t>(this->IsNearest);
 }
 
 void Content::ChooseFunction(vtkVolume* volume, halite::OpacityConvention convention, Functions::Cache& functions)

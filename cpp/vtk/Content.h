@@ -9,8 +9,8 @@
 #include "halite.h"
 
 #include "vtkDataArray.h"
+#include "vtkDataSet.h"
 #include "vtkSmartPointer.h"
-#include "vtkUnstructuredGridBase.h"
 
 VTK_ABI_NAMESPACE_BEGIN
 class vtkVolume;
@@ -20,7 +20,10 @@ struct Content
 {
   // How the core is to work.
   halite::Settings Settings;
-  vtkSmartPointer<vtkUnstructuredGridBase> Grid;
+  vtkSmartPointer<vtkDataSet> Grid;
+  // Whether the core has it as a grid, and then whether the value of the nearest point is drawn.
+  bool IsGrid = false;
+  bool IsNearest = false;
   halite::Renderer::Matrix Placement{};
   vtkSmartPointer<vtkDataArray> Array;
   halite::Association Association = halite::Association::Points;
@@ -31,13 +34,14 @@ struct Content
 
   // What a volume shows of a grid by `array`, of which `cellFlag` says what vtkAbstractMapper::GetScalars does. Throws
   // if there is no array, or VTK has no meaning for it.
-  Content(const halite::Settings& settings, vtkUnstructuredGridBase* grid, vtkDataArray* array, int cellFlag,
-    vtkVolume* volume, halite::OpacityConvention convention, Functions::Cache& functions);
+  Content(const halite::Settings& settings, vtkDataSet* grid, vtkDataArray* array, int cellFlag, vtkVolume* volume,
+    halite::OpacityConvention convention, Functions::Cache& functions);
 
   // What a picture depends on, but for the view.
   Key Whole() const;
 
 private:
   void ChooseField(vtkVolume* volume, int cellFlag);
+  void ChooseInterpolation(vtkVolume* volume);
   void ChooseFunction(vtkVolume* volume, halite::OpacityConvention convention, Functions::Cache& functions);
 };

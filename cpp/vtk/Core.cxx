@@ -77,13 +77,22 @@ void Core::Hold(const Content& content)
   bool hasMesh = !IsNew(this->MeshKey, content.MeshKey);
   if (hasMesh && IsNew(this->PlacementKey, content.PlacementKey))
   {
-    hasMesh = this->Renderer->movePoints(view.Points(content.Grid), &content.Placement);
+    hasMesh = !content.IsGrid && this->Renderer->movePoints(view.Points(content.Grid), &content.Placement);
     this->Done.Points += hasMesh;
   }
   if (!hasMesh)
   {
     this->MeshKey = this->FieldKey = Key();
-    this->Do(Mesh, [&] { this->Renderer->setMesh(view.Mesh(content.Grid), &content.Placement); });
+    this->Do(Mesh, [&] {
+      if (content.IsGrid)
+      {
+        this->Renderer->setGrid(view.Grid(content.Grid, content.IsNearest), &content.Placement);
+      }
+      else
+      {
+        this->Renderer->setMesh(view.Mesh(content.Grid), &content.Placement);
+      }
+    });
     ++this->Done.Meshes;
     this->MeshKey = content.MeshKey;
   }

@@ -10,15 +10,20 @@
 #include "vtkDataSetAttributes.h"
 #include "vtkDoubleArray.h"
 #include "vtkIdList.h"
+#include "vtkImageData.h"
+#include "vtkMatrix3x3.h"
 #include "vtkNew.h"
 #include "vtkPointData.h"
+#include "vtkPointSet.h"
 #include "vtkPoints.h"
+#include "vtkRectilinearGrid.h"
 #include "vtkSOADataArrayTemplate.h"
 #include "vtkTypeInt64Array.h"
 #include "vtkUnsignedCharArray.h"
 #include "vtkUnstructuredGrid.h"
-#include "vtkUnstructuredGridBase.h"
 
+#include <algorithm>
+#include <array>
 #include <cstring>
 
 namespace
@@ -137,7 +142,7 @@ halite::Numbers MeshView::Numbers(vtkDataArray* array, int component)
   return { copy->GetVoidPointer(0), static_cast<std::size_t>(copy->GetNumberOfValues()), type };
 }
 
-halite::Numbers MeshView::Points(vtkUnstructuredGridBase* grid)
+halite::Numbers MeshView::Points(vtkDataSet* grid)
 {
   if (auto sets = vtkPointSet::SafeDownCast(grid))
   {
@@ -189,7 +194,7 @@ struct Faces
 
 }
 
-halite::Mesh MeshView::Mesh(vtkUnstructuredGridBase* base)
+halite::Mesh MeshView::Mesh(vtkDataSet* base)
 {
   static const std::vector<std::int64_t> zero{ 0 };
   halite::Numbers types(nullptr, 0, halite::Type::UInt8), offsets = zero, connectivity(nullptr, 0, halite::Type::Int64);
@@ -247,7 +252,84 @@ halite::Mesh MeshView::Mesh(vtkUnstructuredGridBase* base)
   return mesh;
 }
 
-std::vector<std::uint64_t> MeshView::Identity(vtkUnstructuredGridBase* base)
+bool MeshView::IsGrid(vtkDataSet* grid)
+{
+  return vtkImageData::SafeDownCast(grid) || vtkRectilinearGrid::SafeDownCast(grid);
+}
+
+bool MeshView::HasGhosts(vtkDataSet* grid)
+{
+  return Ghosts(grid->GetPointData()) || Ghosts(grid->GetCellData());
+}
+
+namespace
+{
+
+// Where the values nearest to points end: half way to the next, and at the outer ones.
+std::vector<double> Halves(const std::vector<double>& axis)
+{
+  std::vector<double> ends{ axis.front() };
+  for (std::size_t i = 1; i < axis.size(); ++i)
+  {
+    ends.push_back(axis[i - 1] + (axis[i] - axis[i - 1]) / 2);
+  }
+  ends.push_back(axis.back());
+  return ends;
+}
+
+}
+
+halite::Grid MeshView::Grid(vtkDataSet* base, bool isNearest)
+{
+  std::array<std::vector<double>, 3> axes;
+  std::array<double, 3> origin{ 0, 0, 0 };
+  std::array<double, 9> direction{ 1, 0, 0, 0, 1, 0, 0, 0, 1 };
+  if (auto image = vtkImageData::SafeDownCast(base))
+  {
+    const int* extent = image->GetExtent();
+    const double* spacing = image->GetSpacing();
+    for (int a = 0; a < 3; ++a)
+    {
+      for (int i = extent[2 * a]; i <= extent[2 * a + 1]; ++i)
+      {
+        axes[a].push_back(spacing[a] * i);
+      }
+    }
+    std::copy_n(image->GetOrigin(), 3, origin.begin());
+    std::copy_n(image->GetDirectionMatrix()->GetData(), 9, direction.begin());
+  }
+  else if (auto grid = vtkRectilinearGrid::SafeDownCast(base))
+  {
+    vtkDataArray* coordinates[] = { grid->GetXCoordinates(), grid->GetYCoordinates(), grid->GetZCoordinates() };
+    for (int a = 0; a < 3; ++a)
+    {
+      for (vtkIdType i = 0; i < coordinates[a]->GetNumberOfTuples(); ++i)
+      {
+        axes[a].push_back(coordinates[a]->GetComponent(i, 0));
+      }
+    }
+  }
+  for (auto& axis : axes)
+  {
+    // An axis of one point has no volume, nearest or not.
+    axis = isNearest && axis.size() > 1 ? Halves(axis) : axis;
+  }
+  halite::Grid made(axes[0], axes[1], axes[2], origin, direction);
+  const std::string name = vtkDataSetAttributes::GhostArrayName();
+  vtkDataArray* ofPoints = isNearest ? nullptr : Ghosts(base->GetPointData());
+  if (ofPoints)
+  {
+    made.addArray(name, halite::Association::Points, 1, this->Numbers(ofPoints));
+  }
+  vtkDataArray* ofCells = isNearest ? nullptr : Ghosts(base->GetCellData());
+  if (ofCells)
+  {
+    made.addArray(name, halite::Association::Cells, 1, this->Numbers(ofCells));
+  }
+  return made;
+}
+
+std::vector<std::uint64_t> MeshView::Identity(vtkDataSet* base)
 {
   auto grid = vtkUnstructuredGrid::SafeDownCast(base);
   if (!grid)

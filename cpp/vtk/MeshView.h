@@ -13,8 +13,8 @@
 
 VTK_ABI_NAMESPACE_BEGIN
 class vtkDataArray;
+class vtkDataSet;
 class vtkPoints;
-class vtkUnstructuredGridBase;
 VTK_ABI_NAMESPACE_END
 
 class MeshView
@@ -24,12 +24,22 @@ public:
   halite::Numbers Numbers(vtkDataArray* array, int component = -1);
 
   // The grid's points and cells, and what is left out of it.
-  halite::Mesh Mesh(vtkUnstructuredGridBase* grid);
+  halite::Mesh Mesh(vtkDataSet* grid);
 
-  halite::Numbers Points(vtkUnstructuredGridBase* grid);
+  halite::Numbers Points(vtkDataSet* grid);
+
+  // Whether the core has a type of its own for it: image data and rectilinear grids.
+  static bool IsGrid(vtkDataSet* grid);
+
+  // Whether cells or points of it are marked as ghosts or hidden.
+  static bool HasGhosts(vtkDataSet* grid);
+
+  // Such a grid, and what is left out of it; or, if the value of the nearest point is drawn, that whose cells are what is
+  // nearest to each point.
+  halite::Grid Grid(vtkDataSet* grid, bool isNearest);
 
   // What the mesh of a grid depends on: equal if nothing changed.
-  static std::vector<std::uint64_t> Identity(vtkUnstructuredGridBase* grid);
+  static std::vector<std::uint64_t> Identity(vtkDataSet* grid);
 
   int GetCopies() const { return this->Copies; }
 

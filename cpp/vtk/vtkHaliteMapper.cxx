@@ -5,6 +5,7 @@
 #include "Peeling.h"
 #include "vtkHaliteMapperInternals.h"
 
+#include "vtkDataSet.h"
 #include "vtkInformation.h"
 #include "vtkObjectFactory.h"
 #include "vtkOpenGLActor.h"
@@ -12,7 +13,6 @@
 #include "vtkOpenGLRenderWindow.h"
 #include "vtkPlaneCollection.h"
 #include "vtkRenderer.h"
-#include "vtkUnstructuredGridBase.h"
 #include "vtkVolume.h"
 #include "vtkVolumeProperty.h"
 
@@ -57,6 +57,29 @@ vtkHaliteMapper::~vtkHaliteMapper()
   this->SetTableTexels(nullptr);
   this->SetPolynomialAlpha(nullptr);
   this->SetCylinderPlanes(nullptr);
+}
+
+void vtkHaliteMapper::SetInputData(vtkDataSet* grid)
+{
+  this->SetInputDataInternal(0, grid);
+}
+
+void vtkHaliteMapper::SetInputData(vtkUnstructuredGridBase* grid)
+{
+  this->Superclass::SetInputData(grid);
+}
+
+int vtkHaliteMapper::FillInputPortInformation(int port, vtkInformation* information)
+{
+  if (!this->Superclass::FillInputPortInformation(port, information))
+  {
+    return 0;
+  }
+  for (const char* kind : { "vtkImageData", "vtkRectilinearGrid", "vtkStructuredGrid" })
+  {
+    information->Append(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), kind);
+  }
+  return 1;
 }
 
 bool vtkHaliteMapper::IsSupported(vtkRenderWindow* window)
@@ -121,11 +144,10 @@ void vtkHaliteMapper::Internals::DrawIn(vtkOpenGLRenderWindow* window, vtkRender
       return;
     }
   }
-  const vtkSmartPointer<vtkUnstructuredGridBase> grid =
-    vtkUnstructuredGridBase::SafeDownCast(this->Self.GetInputDataObject(0, 0));
+  const vtkSmartPointer<vtkDataSet> grid = vtkDataSet::SafeDownCast(this->Self.GetInputDataObject(0, 0));
   if (!grid || !volume->GetProperty())
   {
-    this->ErrorOnce("there is no unstructured grid to draw: SetInputData or SetInputConnection gives the mapper one");
+    this->ErrorOnce("there is no grid to draw: SetInputData or SetInputConnection gives the mapper one");
     return;
   }
   if (grid->GetNumberOfCells() == 0)
@@ -274,7 +296,8 @@ void vtkHaliteMapper::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "PolynomialDegree: " << this->PolynomialDegree << "\n";
   os << indent << "PolynomialAlpha: " << Internals::Text(this->PolynomialAlpha) << "\n";
   os << indent << "CylinderPlanes: " << Internals::Text(this->CylinderPlanes) << "\n";
-  os << indent << "OpacityConvention: " << (this->OpacityConvention == OPACITY ? "Opacity" : "Extinction") << "\n";
+  static const char* const conventions[] = { "Extinction", "Opacity", "ByInput" };
+  os << indent << "OpacityConvention: " << conventions[this->OpacityConvention] << "\n";
   os << indent << "ImageSampleDistance: " << this->ImageSampleDistance << "\n";
   os << indent << "NumberOfThreads: " << this->NumberOfThreads << "\n";
   os << indent << "UseFloatingPointFrameBuffer: " << (this->UseFloatingPointFrameBuffer ? "On" : "Off") << "\n";

@@ -3,7 +3,7 @@
  * @class   vtkHaliteMapper
  * @brief   exact volume rendering of unstructured grids
  *
- * Draws any vtkUnstructuredGrid as a volume, by Halite: every pixel is the emission-absorption integral of the field that
+ * Draws any vtkUnstructuredGrid, and the structured kinds of grids, as a volume, by Halite: every pixel is the emission-absorption integral of the field that
  * the grid defines. Grids need no triangulation: tetrahedra, voxels, hexahedra, wedges and pyramids may be mixed, cells of two
  * dimensions and less are left out, and so are ghost, duplicate and hidden cells and cells with hidden points.
  *
@@ -46,6 +46,16 @@ public:
   void Render(vtkRenderer* renderer, vtkVolume* volume) override;
   void ReleaseGraphicsResources(vtkWindow* window) override;
   bool IsSupported(vtkRenderWindow* window) override;
+
+  ///@{
+  /**
+   * What is drawn: a vtkUnstructuredGrid, vtkImageData, vtkRectilinearGrid or vtkStructuredGrid. Image data and rectilinear grids
+   * are drawn as the trilinear fields that they are, by the CPU, whatever the Device; with the interpolation type of the property
+   * nearest (which is its default) as the value of the nearest point, unless points or cells are hidden.
+   */
+  void SetInputData(vtkDataSet* grid) override;
+  void SetInputData(vtkUnstructuredGridBase* grid) override;
+  ///@}
 
   ///@{
   /**
@@ -131,18 +141,21 @@ public:
   enum OpacityConventions
   {
     EXTINCTION,
-    OPACITY
+    OPACITY,
+    BY_INPUT
   };
 
   ///@{
   /**
-   * What opacity a and unit distance d mean. EXTINCTION (the default): the extinction per unit length is a / d, as in VTK's
-   * mappers of unstructured grids. OPACITY: it is -ln(1 - a) / d, as in those of image data.
+   * What opacity a and unit distance d mean. EXTINCTION: the extinction per unit length is a / d, as in VTK's mappers of
+   * unstructured grids. OPACITY: it is -ln(1 - a) / d, as in those of image data. BY_INPUT (the default): what VTK's mappers of such
+   * an input have, OPACITY for image data and rectilinear grids, and EXTINCTION for others.
    */
-  vtkSetClampMacro(OpacityConvention, int, EXTINCTION, OPACITY);
+  vtkSetClampMacro(OpacityConvention, int, EXTINCTION, BY_INPUT);
   vtkGetMacro(OpacityConvention, int);
   void SetOpacityConventionToExtinction() { this->SetOpacityConvention(EXTINCTION); }
   void SetOpacityConventionToOpacity() { this->SetOpacityConvention(OPACITY); }
+  void SetOpacityConventionToByInput() { this->SetOpacityConvention(BY_INPUT); }
   ///@}
 
   ///@{
@@ -226,7 +239,7 @@ protected:
   int PolynomialDegree = 2;
   char* PolynomialAlpha = nullptr;
   char* CylinderPlanes = nullptr;
-  int OpacityConvention = EXTINCTION;
+  int OpacityConvention = BY_INPUT;
   double ImageSampleDistance = 1.0;
   int NumberOfThreads = 0;
   bool UseFloatingPointFrameBuffer = true;
@@ -240,6 +253,8 @@ protected:
    * Draws what was put off until a renderer has finished.
    */
   void DrawDeferred(vtkObject* caller, unsigned long event, void* data);
+
+  int FillInputPortInformation(int port, vtkInformation* information) override;
 
 private:
   vtkHaliteMapper(const vtkHaliteMapper&) = delete;

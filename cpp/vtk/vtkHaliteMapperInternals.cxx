@@ -2,15 +2,16 @@
 #include "vtkHaliteMapperInternals.h"
 
 #include "FrameGuard.h"
+#include "MeshView.h"
 #include "Peeling.h"
 
 #include "vtkCamera.h"
 #include "vtkCommand.h"
 #include "vtkDataArray.h"
+#include "vtkDataSet.h"
 #include "vtkOpenGLRenderPass.h"
 #include "vtkOpenGLRenderWindow.h"
 #include "vtkRenderer.h"
-#include "vtkUnstructuredGridBase.h"
 #include "vtkVolume.h"
 #include "vtkVolumeCollection.h"
 #include "vtkVolumeProperty.h"
@@ -123,7 +124,7 @@ void vtkHaliteMapper::Internals::WarnOfUnsupported(vtkVolumeProperty* property)
   }
 }
 
-Content vtkHaliteMapper::Internals::Choose(vtkUnstructuredGridBase* grid, vtkVolume* volume)
+Content vtkHaliteMapper::Internals::Choose(vtkDataSet* grid, vtkVolume* volume)
 {
   Clock clock(this->Self.PrepareTime);
   halite::Settings settings;
@@ -141,9 +142,9 @@ Content vtkHaliteMapper::Internals::Choose(vtkUnstructuredGridBase* grid, vtkVol
   int cellFlag = 0;
   vtkDataArray* array = vtkAbstractMapper::GetScalars(
     grid, this->Self.ScalarMode, this->Self.ArrayAccessMode, this->Self.ArrayId, this->Self.ArrayName, cellFlag);
-  const auto convention = this->Self.OpacityConvention == vtkHaliteMapper::OPACITY
-    ? halite::OpacityConvention::Opacity
-    : halite::OpacityConvention::Extinction;
+  const bool isSlab = this->Self.OpacityConvention == vtkHaliteMapper::OPACITY ||
+    (this->Self.OpacityConvention == vtkHaliteMapper::BY_INPUT && MeshView::IsGrid(grid));
+  const auto convention = isSlab ? halite::OpacityConvention::Opacity : halite::OpacityConvention::Extinction;
   return Content(settings, grid, array, cellFlag, volume, convention, this->Knots);
 }
 

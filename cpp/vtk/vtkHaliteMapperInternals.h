@@ -137,7 +137,7 @@ struct vtkHaliteMapper::Internals
   Frame& FrameOf(vtkRenderer* renderer, vtkVolume* volume);
   // Lets go what was made for a window: at once, or when the frame that is at work is over.
   void Release(vtkWindow* window);
-  Content Choose(vtkUnstructuredGridBase* grid, vtkVolume* volume);
+  Content Choose(vtkDataSet* grid, vtkVolume* volume);
   // Draws once the renderer has finished.
   void Defer(vtkRenderer* renderer, vtkVolume* volume);
 

@@ -1,9 +1,8 @@
 //! Rays: from voxel to voxel, and what each adds.
 
-use super::cubic::{Cubic, trilinear};
-use super::piece::Piece;
 use super::reconstruction::{Order, Reconstruction, Sampling};
 use super::volume::{Samples, Volume};
+use crate::integral::cubic::{Cubic, Piece, trilinear};
 use crate::integral::{Exact, Knots, Light};
 use crate::view::{Blend, View};
 use glam::DVec3;
@@ -152,8 +151,9 @@ impl<'a, const N: usize> Caster<'a, N> {
         let mut at = Line { o, d }.voxel(self.frame.volume, t);
         // The plane of each axis that comes next, and where.
         let plane = |a: usize, at: usize| if d[a] > 0.0 { at + 1 } else { at };
+        let slope = d.map(|d| 1.0 / d);
         let crossing =
-            |a: usize, at: usize| if d[a] == 0.0 { f64::INFINITY } else { (axes[a][plane(a, at)] - o[a]) / d[a] };
+            |a: usize, at: usize| if d[a] == 0.0 { f64::INFINITY } else { (axes[a][plane(a, at)] - o[a]) * slope[a] };
         let mut next = [0, 1, 2].map(|a| crossing(a, at[a]));
         loop {
             let a = if next[0] <= next[1] && next[0] <= next[2] { 0 } else { 1 + usize::from(next[2] < next[1]) };
@@ -259,63 +259,10 @@ impl<'a, const N: usize> Caster<'a, N> {
             return;
         }
         if N == 1 {
-            self.scalar(last, intervals, length, &mut gathered.light);
+            let shows = |i: usize| self.shows([i, i]);
+            self.frame.exact.add_cubic(last, length, shows, &mut gathered.light);
         } else {
             self.several(cubics, length, &mut gathered.light);
-        }
-    }
-
-    /// Adds a voxel of a single value, which is on these intervals.
-    #[inline(always)]
-    fn scalar(&self, s: &Cubic, [first, last]: [usize; 2], length: f64, light: &mut Light<f64>) {
-        if first == last {
-            return self.line(s, first, length, light);
-        }
-        let places = &self.frame.exact.opacity.s;
-        let turns = s.turns();
-        let mut from = 0.0;
-        for to in [turns[0], turns[1], 1.0] {
-            if to <= from {
-                continue;
-            }
-            let (front, back) = (s.at(from), s.at(to));
-            let rises = back >= front;
-            let mut i = self.frame.exact.opacity.interval(front);
-            while !rises && i > 0 && places[i] >= front {
-                i -= 1;
-            }
-            loop {
-                let ahead = if rises { i + 1 } else { i };
-                let passes = if rises { places[ahead] < back } else { places[ahead] > back };
-                let end = if passes { s.root(places[ahead], from, to) } else { to };
-                // An interval of no width is a step, which has no length either.
-                if end > from && places[i] < places[i + 1] && self.shows([i, i]) {
-                    let share = end - from;
-                    self.line(&s.part(from, end), i, length * share, light);
-                }
-                from = end;
-                if !passes || !rises && i == 0 || rises && ahead + 1 >= places.len() {
-                    break;
-                }
-                i = if rises { i + 1 } else { i - 1 };
-            }
-            from = to;
-        }
-    }
-
-    /// Adds a piece on interval `i` of the function.
-    #[inline(always)]
-    fn line(&self, s: &Cubic, i: usize, length: f64, light: &mut Light<f64>) {
-        let Exact { opacity, direct, .. } = self.frame.exact;
-        let (start, value, slope) = (opacity.s[i], &opacity.value[i], &opacity.slope[i]);
-        let offset = Cubic(s.0.map(|c| c - start));
-        let depth = Cubic(offset.0.map(|c| (value[0] + slope[0] * c) * length));
-        if *direct {
-            let sum = Piece { depth, emission: [Cubic::constant(1.0), offset] }.integrate(true);
-            light.add([1, 2, 3].map(|k| (value[k] * sum.emitted[0] + slope[k] * sum.emitted[1]) * length), sum.alpha);
-        } else {
-            let sum = Piece { depth, emission: [offset] }.integrate(false);
-            light.add([1, 2, 3].map(|k| value[k] * sum.alpha + slope[k] * sum.emitted[0]), sum.alpha);
         }
     }
 

@@ -4,8 +4,8 @@
 //! A *slab* is what lies between a front and a back sample, with a third in the middle; the back sample of one is the front
 //! of the next. So all orders take as many samples, and differ in what they make of them.
 
-use super::cubic::Cubic;
 use crate::error::{Error, Result};
+use crate::integral::cubic::Cubic;
 
 /// What stands for the field between samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -49,11 +49,7 @@ impl Order {
     pub(super) fn part(self, part: usize, [front, middle, back]: [f64; 3]) -> Cubic {
         let [a, b] = if part == 0 { [front, middle] } else { [middle, back] };
         match self {
-            Order::Exact | Order::Two => {
-                // A parabola's own middle coefficient, and its degree raised.
-                let bend = 2.0 * middle - 0.5 * (front + back);
-                Cubic([front, (front + 2.0 * bend) / 3.0, (2.0 * bend + back) / 3.0, back])
-            }
+            Order::Exact | Order::Two => Cubic::parabola([front, middle, back]),
             Order::One => Cubic([a, a + (b - a) / 3.0, b - (b - a) / 3.0, b]),
             Order::Midpoint => Cubic::constant(middle),
             Order::Left => Cubic::constant(a),

@@ -120,6 +120,24 @@ impl<R: Real> Knots<R> {
         self.value.iter().fold(R::of(0.0), |most, v| most.max(v[0]))
     }
 
+    /// How much extinction varies at most over a stretch of values `width` wide.
+    pub(crate) fn variation(&self, width: R) -> R {
+        let mut most = R::of(0.0);
+        for (i, &s) in self.s.iter().enumerate() {
+            // The extremes of a piecewise linear function are at knots and at the stretch's ends; one end may be taken to be
+            // at a knot.
+            for [from, to] in [[s, s + width], [s - width, s]] {
+                let (mut low, mut high) = (self.value[i][0], self.value[i][0]);
+                let mut take = |v: R| (low, high) = (low.min(v), high.max(v));
+                let inside = self.s.iter().zip(&self.value).filter(|(k, _)| from <= **k && **k <= to);
+                inside.for_each(|(_, v)| take(v[0]));
+                [from, to].into_iter().for_each(|end| take(self.color_at(end, 0)));
+                most = most.max(high - low);
+            }
+        }
+        most
+    }
+
     /// Whether extinction changes by a share that can be seen, and not as a step, between knots closer than `width`.
     pub(crate) fn is_sharp(&self, width: R) -> bool {
         let seen = self.steepest() * R::of(1e-2);

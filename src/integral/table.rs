@@ -2,7 +2,7 @@
 //!
 //! Each form is judged by the exact integral, and read here as a device's linear filter reads it: [`Table`] has all
 //! three parameters, [`Polynomial`] the values only, and [`Cylindrical`] planes of two parameters that hold a projected
-//! cell each.
+//! cell each. [`SecondOrder`] and [`SecondOrderPolynomial`] are for slabs along which the value is a parabola.
 
 mod bound;
 mod closed;
@@ -12,6 +12,7 @@ mod incremental;
 mod linear;
 mod polynomial;
 mod sampled;
+mod second_order;
 mod storage;
 mod volume;
 
@@ -20,6 +21,7 @@ pub use cylindrical::Cylindrical;
 pub use linear::Linear;
 pub use polynomial::Polynomial;
 pub use sampled::{Sampling, Steps};
+pub use second_order::{SecondOrder, SecondOrderPolynomial, parabola};
 pub use storage::Storage;
 pub use volume::{Kind, Table, coordinate, length};
 

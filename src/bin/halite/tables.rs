@@ -1,3 +1,5 @@
+mod second;
+
 use crate::render::{self, Request};
 use crate::{output, parse, progress};
 use anyhow::{Context, Result};
@@ -20,7 +22,7 @@ use std::time::Instant;
 ///
 /// Builds each published form of table for the scene's cells, in each way that is known, and tells its size, the time
 /// that took, and its errors against adaptive integration in 64 bits, over segments with any values and lengths. With
-/// --device, a device builds them too.
+/// --device, a device builds them too. Second-order tables are for slabs along which the value is a parabola.
 #[derive(Args)]
 pub(crate) struct Options {
     #[command(flatten)]
@@ -83,7 +85,8 @@ struct Row {
     bound: Option<f64>,
     bytes: u64,
     build_ms: f64,
-    look_up: LookUp,
+    /// None for slabs of three samples, which the sheet does not show.
+    look_up: Option<LookUp>,
     rms: f64,
     max: f64,
 }
@@ -137,6 +140,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
                 progress(i as f64 / count);
                 rows.extend(row(form, &truth)?);
             }
+            rows.extend(second::rows(&exact, longest, options.values, options.segments));
             Ok(rows)
         })?;
         output::print(&text(&rows))?;
@@ -183,7 +187,8 @@ fn row(form: Form<'_>, truth: &[([f64; 3], [f64; 4])]) -> Result<Option<Row>> {
     let Form { name, construction, size, bound, .. } = form;
     let Built { bytes, look_up, .. } = last;
     let [rms, max] = errors(truth, &look_up);
-    Ok(Some(Row { name, construction, size, bound, bytes, build_ms: times[times.len() / 2], look_up, rms, max }))
+    let build_ms = times[times.len() / 2];
+    Ok(Some(Row { name, construction, size, bound, bytes, build_ms, look_up: Some(look_up), rms, max }))
 }
 
 /// All forms and constructions.
@@ -364,14 +369,15 @@ fn tiled(table: &Cylindrical) -> Image {
 /// difference from the exact integral times `gain`.
 fn sheet(rows: &[Row], exact: &Exact<f64>, longest: f64, gain: f32) -> Image {
     let step = SIDE + MARGIN;
-    let size = [2 * LENGTHS.len() * step + MARGIN, rows.len() * step + MARGIN];
+    let shown = rows.iter().filter(|r| r.look_up.is_some()).count();
+    let size = [2 * LENGTHS.len() * step + MARGIN, shown * step + MARGIN];
     let mut sheet = Image::new(size.map(|n| n as u32));
     sheet.pixels.fill([0.2, 0.2, 0.2, 1.0]);
-    for (row, of_row) in rows.iter().enumerate() {
+    for (row, look_up) in rows.iter().filter_map(|r| r.look_up.as_ref()).enumerate() {
         for (column, length) in LENGTHS.iter().enumerate() {
             for (i, j) in (0..SIDE).flat_map(|j| (0..SIDE).map(move |i| (i, j))) {
                 let [front, back] = [i, j].map(|k| (2.0 * k as f64 + 1.0) / SIDE as f64 - 1.0);
-                let got = (of_row.look_up)(front, back, length * longest);
+                let got = look_up(front, back, length * longest);
                 let want = truth(exact, front, back, length * longest);
                 let at = (MARGIN + row * step + j) * size[0] + MARGIN + 2 * column * step + i;
                 let [r, g, b] = [0, 1, 2].map(|k| got[k] as f32);

@@ -1,13 +1,20 @@
-//! The trilinear field along a ray inside one voxel: a cubic, in Bernstein form.
+//! Stretches of a ray along which the scalar is a cubic, in Bernstein form: a trilinear field in one voxel, or what stands for
+//! it between samples.
 //!
 //! A trilinear function is affine in each coordinate by itself. So its blossom along the straight line from p to q is what
 //! it is at points that take some coordinates from p and the others from q, and the coefficients of the cubic are means of
 //! the eight corners of the box that p and q span. Nothing cancels, and the least and the greatest coefficient bound the
 //! cubic.
 
+mod piece;
+
+pub(crate) use piece::Piece;
+
+use super::{Exact, GAUSS_6, Light};
+
 /// The trilinear function with these values at the corners of the unit cube, at `p`.
 #[inline(always)]
-pub(super) fn trilinear(corners: &[f64; 8], p: [f64; 3]) -> f64 {
+pub(crate) fn trilinear(corners: &[f64; 8], p: [f64; 3]) -> f64 {
     let mix = |a: f64, b: f64, w: f64| a + (b - a) * w;
     let x = [0, 2, 4, 6].map(|i| mix(corners[i], corners[i + 1], p[0]));
     mix(mix(x[0], x[1], p[1]), mix(x[2], x[3], p[1]), p[2])
@@ -15,12 +22,12 @@ pub(super) fn trilinear(corners: &[f64; 8], p: [f64; 3]) -> f64 {
 
 /// A cubic over [0, 1] by its Bernstein coefficients.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Cubic(pub(super) [f64; 4]);
+pub(crate) struct Cubic(pub(crate) [f64; 4]);
 
 impl Cubic {
     /// The trilinear function with these values at the corners of the unit cube (x fastest, then y), from `p` to `q`.
     #[inline(always)]
-    pub(super) fn along(corners: &[f64; 8], p: [f64; 3], q: [f64; 3]) -> Self {
+    pub(crate) fn along(corners: &[f64; 8], p: [f64; 3], q: [f64; 3]) -> Self {
         let mix = |a: f64, b: f64, w: f64| a + (b - a) * w;
         let x = [0, 2, 4, 6].map(|i| [p[0], q[0]].map(|w| mix(corners[i], corners[i + 1], w)));
         let ends = [p[1], q[1]];
@@ -36,27 +43,35 @@ impl Cubic {
         ])
     }
 
+    /// The parabola through three samples: at 0, ½ and 1.
+    #[inline(always)]
+    pub(crate) fn parabola([front, middle, back]: [f64; 3]) -> Self {
+        // Its own middle coefficient, and its degree raised.
+        let bend = 2.0 * middle - 0.5 * (front + back);
+        Cubic([front, (front + 2.0 * bend) / 3.0, (2.0 * bend + back) / 3.0, back])
+    }
+
     /// The same value everywhere.
-    pub(super) fn constant(s: f64) -> Self {
+    pub(crate) fn constant(s: f64) -> Self {
         Cubic([s; 4])
     }
 
     /// What it is not below and not above.
     #[inline(always)]
-    pub(super) fn bounds(&self) -> [f64; 2] {
+    pub(crate) fn bounds(&self) -> [f64; 2] {
         let [a, b, c, d] = self.0;
         [a.min(b).min(c.min(d)), a.max(b).max(c.max(d))]
     }
 
     /// Its value at `u`.
     #[inline(always)]
-    pub(super) fn at(&self, u: f64) -> f64 {
+    pub(crate) fn at(&self, u: f64) -> f64 {
         let ([a, b, c, d], v) = (self.0, 1.0 - u);
         v * v * (v * a + 3.0 * u * b) + u * u * (3.0 * v * c + u * d)
     }
 
     /// The part from `u` to `v`, over [0, 1], by de Casteljau's construction.
-    pub(super) fn part(&self, u: f64, v: f64) -> Self {
+    pub(crate) fn part(&self, u: f64, v: f64) -> Self {
         let blossom = |r: f64, s: f64, t: f64| {
             let mix = |a: f64, b: f64, w: f64| a * (1.0 - w) + b * w;
             let [a, b, c, d] = self.0;
@@ -67,7 +82,7 @@ impl Cubic {
     }
 
     /// Where in ]0, 1[ it turns, ascending; 1 in place of what is not there.
-    pub(super) fn turns(&self) -> [f64; 2] {
+    pub(crate) fn turns(&self) -> [f64; 2] {
         let [a, b, c, d] = self.0;
         // The derivative's Bernstein coefficients, but for a factor of 3: p (1−u)² + 2 q u (1−u) + r u².
         let (p, q, r) = (b - a, c - b, d - c);
@@ -85,7 +100,7 @@ impl Cubic {
 
     /// Where in [`from`, `to`], between which it is monotone, it has the value `s`, which is between those at the ends; by
     /// Newton's steps, and by halves where these leave the bracket or are slow.
-    pub(super) fn root(&self, s: f64, mut from: f64, mut to: f64) -> f64 {
+    pub(crate) fn root(&self, s: f64, mut from: f64, mut to: f64) -> f64 {
         let rises = self.at(to) > self.at(from);
         let ([a, b, c, d], mut u) = (self.0, f64::midpoint(from, to));
         for _ in 0..80 {
@@ -104,6 +119,115 @@ impl Cubic {
             u = if newton > from && newton < to { newton } else { f64::midpoint(from, to) };
         }
         u
+    }
+}
+
+impl Exact<f64> {
+    /// Calls `line` for each part of a cubic that is on one interval of the opacity function, in order: with its ends in
+    /// [0, 1] and the interval. Parts that `shows` says nothing is seen of may be left out.
+    #[inline(always)]
+    pub(crate) fn for_each_line(
+        &self,
+        s: &Cubic,
+        shows: impl Fn(usize) -> bool,
+        mut line: impl FnMut(f64, f64, usize),
+    ) {
+        let [low, high] = s.bounds();
+        let (knots, [first, last]) = (&self.opacity, self.opacity.intervals(low, high));
+        if first == last {
+            if shows(first) {
+                line(0.0, 1.0, first);
+            }
+            return;
+        }
+        let places = &knots.s;
+        let turns = s.turns();
+        let mut from = 0.0;
+        for to in [turns[0], turns[1], 1.0] {
+            if to <= from {
+                continue;
+            }
+            let (front, back) = (s.at(from), s.at(to));
+            let rises = back >= front;
+            let mut i = knots.interval(front);
+            while !rises && i > 0 && places[i] >= front {
+                i -= 1;
+            }
+            loop {
+                let ahead = if rises { i + 1 } else { i };
+                let passes = if rises { places[ahead] < back } else { places[ahead] > back };
+                let end = if passes { s.root(places[ahead], from, to) } else { to };
+                // An interval of no width is a step, which has no length either.
+                if end > from && places[i] < places[i + 1] && shows(i) {
+                    line(from, end, i);
+                }
+                from = end;
+                if !passes || !rises && i == 0 || rises && ahead + 1 >= places.len() {
+                    break;
+                }
+                i = if rises { i + 1 } else { i - 1 };
+            }
+            from = to;
+        }
+    }
+
+    /// Adds a stretch `length` normalised units long along which a scalar is `s`; parts that `shows` says nothing is seen
+    /// of may be left out.
+    #[inline(always)]
+    pub(crate) fn add_cubic(&self, s: &Cubic, length: f64, shows: impl Fn(usize) -> bool, light: &mut Light<f64>) {
+        self.for_each_line(s, shows, |from, to, i| {
+            let part = if from == 0.0 && to == 1.0 { *s } else { s.part(from, to) };
+            self.add_line(&part, i, length * (to - from), light);
+        });
+    }
+
+    /// Adds a stretch on interval `i` of the function.
+    #[inline(always)]
+    fn add_line(&self, s: &Cubic, i: usize, length: f64, light: &mut Light<f64>) {
+        let (value, slope) = (&self.opacity.value[i], &self.opacity.slope[i]);
+        let (offset, extinction) = self.on_line(s, i);
+        let depth = Cubic(extinction.0.map(|c| c * length));
+        if self.direct {
+            let sum = Piece { depth, emission: [Cubic::constant(1.0), offset] }.integrate(true);
+            light.add([1, 2, 3].map(|k| (value[k] * sum.emitted[0] + slope[k] * sum.emitted[1]) * length), sum.alpha);
+        } else {
+            let sum = Piece { depth, emission: [offset] }.integrate(false);
+            light.add([1, 2, 3].map(|k| value[k] * sum.alpha + slope[k] * sum.emitted[0]), sum.alpha);
+        }
+    }
+
+    /// How far a cubic is above the start of interval `i`, and the extinction along it there.
+    #[inline(always)]
+    fn on_line(&self, s: &Cubic, i: usize) -> (Cubic, Cubic) {
+        let (start, value, slope) = (self.opacity.s[i], self.opacity.value[i][0], self.opacity.slope[i][0]);
+        let offset = Cubic(s.0.map(|c| c - start));
+        (offset, Cubic(offset.0.map(|c| value + slope * c)))
+    }
+
+    /// The mean extinction along a cubic, per normalised unit; and of the colour there (direct: emission), the mean by what
+    /// each part adds to the extinction, or, where that is nothing or emission is direct, to the length.
+    pub(crate) fn means(&self, s: &Cubic) -> (f64, [f64; 3]) {
+        let (mut density, mut weighed, mut plain) = (0.0, [0.0; 3], [0.0; 3]);
+        self.for_each_line(
+            s,
+            |_| true,
+            |from, to, i| {
+                let (value, slope) = (&self.opacity.value[i], &self.opacity.slope[i]);
+                let (offset, extinction) = self.on_line(&s.part(from, to), i);
+                // Exact for the product of two cubics.
+                for [u, weight] in GAUSS_6 {
+                    let (w, rho) = (weight * (to - from), extinction.at(u).max(0.0));
+                    density += w * rho;
+                    for k in 0..3 {
+                        let color = value[k + 1] + slope[k + 1] * offset.at(u);
+                        plain[k] += w * color;
+                        weighed[k] += w * rho * color;
+                    }
+                }
+            },
+        );
+        let by_extinction = density > 0.0 && !self.direct;
+        (density, if by_extinction { weighed.map(|c| c / density) } else { plain })
     }
 }
 

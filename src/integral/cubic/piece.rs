@@ -6,7 +6,7 @@
 //! Gauss–Legendre sums over parts of small optical depth, in f64 and as accurate as f32 can tell. What is deep is halved,
 //! from the front, until nothing behind can be seen.
 
-use super::cubic::Cubic;
+use super::Cubic;
 use crate::integral::{DEEP, GAUSS_6};
 
 /// Nodes in [0, 1] and weights of the 4-point Gauss–Legendre rule.
@@ -28,22 +28,22 @@ const HALVINGS: u32 = 60;
 
 /// A piece: extinction times length, and what is emitted, M cubics.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Piece<const M: usize> {
-    pub(super) depth: Cubic,
-    pub(super) emission: [Cubic; M],
+pub(crate) struct Piece<const M: usize> {
+    pub(crate) depth: Cubic,
+    pub(crate) emission: [Cubic; M],
 }
 
 /// What a piece does: its opacity, and the integral of each emission, per length for direct ones.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Sum<const M: usize> {
-    pub(super) alpha: f64,
-    pub(super) emitted: [f64; M],
+pub(crate) struct Sum<const M: usize> {
+    pub(crate) alpha: f64,
+    pub(crate) emitted: [f64; M],
 }
 
 impl<const M: usize> Piece<M> {
     /// Its optical depth.
     #[inline(always)]
-    pub(super) fn total(&self) -> f64 {
+    pub(crate) fn total(&self) -> f64 {
         let [a, b, c, d] = self.depth.0;
         // Bernstein coefficients may lie below a cubic that is nowhere negative.
         ((a + b + c + d) * 0.25).max(0.0)
@@ -51,7 +51,7 @@ impl<const M: usize> Piece<M> {
 
     /// Its integral: error at most 1e-6, and 1e-5 of α, of what is emitted, where that is up to 1.
     #[inline(always)]
-    pub(super) fn integrate(&self, direct: bool) -> Sum<M> {
+    pub(crate) fn integrate(&self, direct: bool) -> Sum<M> {
         let total = self.total();
         if total <= THIN {
             return self.sum(&GAUSS_4, total, direct);
@@ -100,7 +100,8 @@ impl<const M: usize> Piece<M> {
             let v = 1.0 - u;
             let (uu, vv) = (u * u, v * v);
             let passed = u * (4.0 * v * vv * t[0] + 6.0 * u * vv * t[1] + 4.0 * uu * v * t[2] + u * uu * total);
-            let seen = weight * (-passed.max(0.0)).exp();
+            // The series takes no decisions: a loop over it becomes vector instructions.
+            let seen = weight * if total <= THICK { series(passed) } else { (-passed.max(0.0)).exp() };
             let density = if direct { seen } else { seen * self.depth.at(u).max(0.0) };
             absorbed += density;
             for (sum, e) in emitted.iter_mut().zip(&self.emission) {
@@ -118,10 +119,23 @@ impl<const M: usize> Piece<M> {
 /// 1 − e^{−depth}, accurate relative to itself.
 #[inline(always)]
 fn opacity(d: f64) -> f64 {
-    if d < 1e-2 {
-        return d * (1.0 - d * (1.0 / 2.0 - d * (1.0 / 6.0 - d * (1.0 / 24.0 - d * (1.0 / 120.0 - d / 720.0)))));
+    if d <= THICK { series_of_opacity(d) } else { 1.0 - (-d).exp() }
+}
+
+/// e^{−x} for x up to [`THICK`], to 1e-8.
+#[inline(always)]
+fn series(x: f64) -> f64 {
+    1.0 - series_of_opacity(x)
+}
+
+/// 1 − e^{−x} for x up to [`THICK`], to 2e-8 of itself.
+#[inline(always)]
+fn series_of_opacity(x: f64) -> f64 {
+    let mut sum = x * (1.0 / 5040.0);
+    for factorial in [720.0, 120.0, 24.0, 6.0, 2.0, 1.0] {
+        sum = x * (1.0 / factorial - sum);
     }
-    1.0 - (-d).exp()
+    sum
 }
 
 #[cfg(test)]
