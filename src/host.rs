@@ -29,7 +29,7 @@ use std::time::Duration;
 /// How often the caller is told the progress of a frame.
 const TELL: Duration = Duration::from_millis(20);
 
-/// Names of the engines that a session may be asked for; the first two are the same.
+/// Names of the engines that a session may be asked for.
 pub const ENGINES: [&str; 3] = ["auto", "traverse", "project"];
 
 /// What scenes call `name`, in letters of either case; the default if it is empty.
@@ -106,7 +106,11 @@ impl Session {
             let known = ENGINES.join("\", \"");
             return Err(Error::Render(format!("no engine is called \"{engine}\"; there are \"{known}\"")));
         }
-        let engine = if engine.eq_ignore_ascii_case("project") { Engine::Project } else { Engine::Auto };
+        let engine = match engine.to_ascii_lowercase().as_str() {
+            "traverse" => Engine::Traverse,
+            "project" => Engine::Project,
+            _ => Engine::Auto,
+        };
         let renderer = log.collect(|| Renderer::with_engine(threads, DeviceChoice::parse(device), engine))?;
         Ok(Session { renderer, state: State::NoMesh, mirrored: false, hidden: vec![], log, failed: false })
     }
