@@ -24,9 +24,6 @@ const BLOCKS: usize = PIXELS / 8;
 /// in a gap.
 const SLACK: f32 = 2e-6;
 
-/// Transmittance below which rounding of a dense cell's lengths is not seen.
-const DARK: f32 = 1e-3;
-
 /// After so many fragments it is looked for pixels that are done.
 const GLANCE: u64 = 4096;
 
@@ -164,9 +161,9 @@ impl<const N: usize> Canvas<N> {
         }
         self.measure(simd, scene, integral, r);
         self.fragments += self.found.count as u64;
-        if r.coarse {
+        if r.dark < f32::INFINITY {
             self.flush(simd, scene, integral.exact.direct);
-            self.doubt();
+            self.doubt(r.dark);
         }
         if self.fragments >= self.glance {
             self.rest(least_light(integral.exact.direct), scene.blend);
@@ -238,10 +235,10 @@ impl<const N: usize> Canvas<N> {
 
     /// Flags pixels through which too much light comes after a cell whose numbers f32 does not tell.
     #[cold]
-    fn doubt(&mut self) {
+    fn doubt(&mut self, dark: f32) {
         for &at in &self.found.pixel[..self.found.count] {
             let at = at as usize % PIXELS;
-            if self.flaws[at] == Flaw::None && self.light[at][3] > DARK {
+            if self.flaws[at] == Flaw::None && self.light[at][3] > dark {
                 self.flaws[at] = Flaw::Coarse;
             }
         }
@@ -340,8 +337,8 @@ impl<const N: usize> Canvas<N> {
             }
         }
         self.fragments += self.found.count as u64;
-        if r.coarse && scene.blend == Blend::Maximum {
-            self.doubt();
+        if r.dark < f32::INFINITY && scene.blend == Blend::Maximum {
+            self.doubt(r.dark);
         }
         if self.fragments >= self.glance {
             self.rest(least_light(integral.exact.direct), scene.blend);

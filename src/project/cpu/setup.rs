@@ -30,8 +30,11 @@ const FLAT: f64 = 2e-3;
 /// A face whose area on the screen is less than this share of the terms that it is the difference of is edge-on: no order follows.
 const EDGE_ON: f64 = 1e-10;
 
-/// Optical depth over a cell's extent in depth from which on rounding of lengths shows in pixels that light comes through.
+/// Optical depth over a cell's extent in depth, times the transmittance behind it, from which on rounding of lengths shows.
 const DENSE: f64 = 30.0;
+
+/// Transmittance below which it is not seen.
+const DARK: f32 = 1e-3;
 
 /// Size of normalised values from which on rounding of others in the same cell shows where one value makes the pixel.
 const WIDE: f32 = 4.0;
@@ -70,8 +73,9 @@ pub(super) struct Record<const N: usize> {
     /// A bit for each corner whose opposite face is turned away for sure: the cell beyond it comes later.
     pub(super) away: u8,
     pub(super) look: Look,
-    /// f32's lengths are too coarse for its extinction, where that lets light through, or f32's values for the largest.
-    pub(super) coarse: bool,
+    /// Transmittance behind the cell beyond which f32's lengths are too coarse for its extinction, or f32's values for the largest;
+    /// infinite for most cells.
+    pub(super) dark: f32,
     /// First and last interval of the transfer function (scalar fields).
     pub(super) lines: [u16; 2],
     /// Index into the mesh.
@@ -160,6 +164,22 @@ impl<const N: usize> Scene<'_, N> {
             opacity.intervals(low, high).map(|i| i as u16)
         } else {
             UNSEEN
+        }
+    }
+
+    /// See [`Record::dark`]. What light comes through changes by its product with the extinction and the error of the length.
+    #[inline(always)]
+    fn dark(&self, span: &[[f32; 2]; N], lines: [u16; 2], extent: f64) -> f32 {
+        match self.blend {
+            Blend::Composite if f64::from(self.steepest) * extent > DENSE => {
+                let depth = f64::from(self.exact.opacity.densest(lines)) * extent;
+                if depth > DENSE { ((DENSE / depth) as f32).max(DARK) } else { f32::INFINITY }
+            }
+            Blend::Composite => f32::INFINITY,
+            Blend::Maximum => {
+                let wide = |s: &[f32; 2]| s[0] < s[1] && (s[0] < -WIDE || s[1] > WIDE || s[1] - s[0] > STEEP);
+                if span.iter().any(wide) { 0.0 } else { f32::INFINITY }
+            }
         }
     }
 
@@ -447,15 +467,7 @@ fn set_up_four<S: Simd, const N: usize>(
             fronts: front.count_ones() as u8,
             away: away as u8,
             look,
-            coarse: match scene.blend {
-                Blend::Composite => {
-                    f64::from(scene.steepest) * extents[l] > DENSE
-                        && f64::from(scene.exact.opacity.densest(lines)) * extents[l] > DENSE
-                }
-                Blend::Maximum => {
-                    span.iter().any(|s| s[0] < s[1] && (s[0] < -WIDE || s[1] > WIDE || s[1] - s[0] > STEEP))
-                }
-            },
+            dark: scene.dark(&span, lines, extents[l]),
             lines,
             cell,
         });
