@@ -19,6 +19,7 @@
 
 pub mod cast;
 pub mod cell;
+pub mod engine;
 pub mod error;
 #[cfg(feature = "ffi")]
 pub mod ffi;

@@ -6,11 +6,13 @@ mod frame;
 mod grid;
 mod loaded;
 mod prepared;
+mod recover;
 mod second;
 mod stats;
 mod tables;
 
 use crate::cast::Reconstruction;
+pub use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::field::Field;
 use crate::geometry::Geometry;
@@ -39,19 +41,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::Instant;
 use tables::{Key, Tables};
-
-/// How frames are drawn.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Engine {
-    /// [`Engine::Traverse`] on a graphics device, [`Engine::Project`] on the CPU.
-    #[default]
-    Auto,
-    /// Rays walk from cell to cell; exact for every mesh. See [`crate::traverse`].
-    Traverse,
-    /// Cells are sorted by depth, projected and blended; needs a graphics device, be it in software. See
-    /// [`crate::project`].
-    Project,
-}
 
 /// Draws one mesh, as often as wanted; keeps what did not change between frames.
 #[derive(Debug)]
@@ -341,7 +330,7 @@ impl Renderer {
             }
             if stopped.load(Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
-        let image = self.render_anyhow(view, &tell)?;
+        let image = self.render_or_recover(view, &tell)?;
         if stopped.load(Relaxed) { Err(Error::Aborted) } else { Ok(image) }
     }
 
@@ -352,43 +341,6 @@ impl Renderer {
     pub fn check_room(&self, points: usize, tetrahedra: &Tetrahedra) -> Result<()> {
         let (points, count) = (points + tetrahedra.added.len(), tetrahedra.corners.len());
         memory::check(&format!("{count} tetrahedra of {points} points"), Geometry::room(points, count))
-    }
-
-    fn render_anyhow(&mut self, view: &View, progress: &Progress) -> Result<Image> {
-        let [w, h] = view.size();
-        let pixels = u64::from(w) * u64::from(h) * size_of::<[f32; 4]>() as u64;
-        memory::check(&format!("a picture of {w}x{h} pixels"), pixels)?;
-        match self.try_render(view, progress) {
-            Err(Error::Lost(why)) => {
-                tracing::warn!("{why}; opening it again");
-                match Backend::open(self.engine, &self.choice) {
-                    Ok(backend) => self.backend = backend,
-                    Err(_) if self.backend.may_fall_back() => self.backend = Backend::without_device(self.engine),
-                    Err(e) => return Err(e),
-                }
-                self.name_device();
-                tracing::warn!("now drawing on {} ({})", self.stats.device, self.stats.adapter);
-            }
-            Err(e @ (Error::Memory { .. } | Error::Device(_)))
-                if self.choice == DeviceChoice::Auto && self.backend.may_fall_back() =>
-            {
-                self.draw_on_cpu(&e);
-            }
-            done => return done,
-        }
-        match self.try_render(view, progress) {
-            Err(e @ Error::Lost(_)) if self.backend.may_fall_back() => {
-                self.draw_on_cpu(&e);
-                self.try_render(view, progress)
-            }
-            done => done,
-        }
-    }
-
-    pub(crate) fn draw_on_cpu(&mut self, why: &Error) {
-        tracing::warn!("{why}; now drawing on the CPU");
-        self.backend = Backend::without_device(self.engine);
-        self.name_device();
     }
 
     /// Normalises the values anew if the transfer function has changed and asks for it.

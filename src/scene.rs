@@ -20,6 +20,7 @@ pub use opaque::Opaque;
 pub use reader::read;
 pub use second::widget;
 
+use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::field::{Association, Component, Field};
 use crate::memory;
@@ -59,8 +60,8 @@ pub struct Scene {
     pub blend: Blend,
     /// What an 8-bit picture shows behind everything, in [0, 1].
     pub background: Option<[f64; 3]>,
-    /// The name of an engine, for the program to choose.
-    pub engine: Option<String>,
+    /// How it is drawn, unless the program chooses.
+    pub engine: Option<Engine>,
     /// A device, for the program to choose.
     pub device: Option<Value>,
     /// A form of the ray integral, for the program to choose.

@@ -1,9 +1,10 @@
 //! The projection on the CPU: cells are dealt to tiles of the image, ordered tile by tile, and swept from front to back with
 //! neighbouring pixels in vector lanes. Nothing is gathered: a cell's numbers are the same for all of its pixels.
 //!
-//! The stages: [`coarse`] projects points and deals cells to tiles, [`setup`] makes records of a tile's cells, [`order`] finds their
-//! sequence, [`fine`] finds and checks their pixels, [`measure`] integrates. Each pixel checks that what it composites is the mesh along its ray, piece after piece; those where
-//! it is not are drawn again by the walk. So the picture is the walk's where the order fails.
+//! The stages: [`coarse`] projects points and deals cells to tiles, [`setup`] makes records of a tile's cells, [`order`]
+//! finds their sequence, [`fine`] finds and checks their pixels, [`measure`] integrates. Each pixel checks that what it
+//! composites is the mesh along its ray, piece after piece; those where it is not are drawn again by the walk. So the
+//! picture is the walk's where the order fails.
 
 mod coarse;
 mod fine;
@@ -16,7 +17,6 @@ mod setup;
 pub(crate) mod tests;
 
 use crate::geometry::{Geometry, Values};
-use crate::gpu::Part;
 use crate::integral::Integral;
 use crate::traverse::cpu;
 use crate::view::{Blend, View};
@@ -32,6 +32,9 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 
 /// The most columns or rows of an image: beyond, single floats do not tell places.
 const MOST_PIXELS: u32 = 1 << 15;
+
+/// The most points of a transfer function: 16 bits number the lines between them.
+const MOST_KNOTS: usize = u16::MAX as usize;
 
 /// Of the pixels that the mesh covers, the share from which on the walk draws all of a frame again.
 const MOST_REDRAWN: f64 = 0.25;
@@ -117,18 +120,23 @@ impl Sweep {
         }
     }
 
-    /// Takes `part` for changed.
-    pub(crate) fn forget(&mut self, part: Part) {
-        if part != Part::Points {
-            self.lines.clear();
-        }
+    /// Takes the values of cells, or the function, for changed.
+    pub(crate) fn forget_values(&mut self) {
+        self.lines.clear();
     }
 
     /// Draws a frame on the current rayon pool.
     pub(crate) fn render<const N: usize>(&mut self, frame: &Frame<N>) -> (Vec<[f32; 4]>, Counts) {
         let size = frame.view.size();
-        if size.iter().any(|&n| n > MOST_PIXELS) {
-            return walk(frame, Counts { handed_over: Some("the image is too wide or high"), ..Counts::default() });
+        let too_much = if size.iter().any(|&n| n > MOST_PIXELS) {
+            Some("the image is too wide or high")
+        } else if frame.integral.exact.opacity.len() > MOST_KNOTS {
+            Some("the transfer function has too many points")
+        } else {
+            None
+        };
+        if too_much.is_some() {
+            return walk(frame, Counts { handed_over: too_much, ..Counts::default() });
         }
         let mut pixels = vec![[0.0; 4]; size[0] as usize * size[1] as usize];
         let Some(lens) = Lens::new(frame.geometry, frame.view) else { return (pixels, Counts::default()) };
@@ -266,9 +274,8 @@ type Fault = Option<std::convert::Infallible>;
 #[cfg(test)]
 type Fault = Option<tests::Fault>;
 
-/// As [`sweep`], in the instructions of `level`. Each set of them is another copy of all that the sweep is, so of x86's there are two:
-/// AVX-512 gained 4 to 8 % in a trial.
-#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+/// As [`sweep`], in the instructions of `level`. Each set of them is another copy of all that the sweep is, so of x86's
+/// there are two: AVX-512 gained 4 to 8 % in a trial.
 fn draw<const N: usize>(
     level: Level,
     worker: &mut Worker<N>,
@@ -278,31 +285,22 @@ fn draw<const N: usize>(
     place: &mut [u32],
     fault: Fault,
 ) {
-    if let Some(avx2) = level.as_avx2() {
-        avx2.vectorize(
-            #[inline(always)]
-            || sweep(avx2, worker, frame, scene, corner, place, fault),
-        );
-    } else if let Some(sse2) = level.as_sse2() {
-        sse2.vectorize(
-            #[inline(always)]
-            || sweep(sse2, worker, frame, scene, corner, place, fault),
-        );
+    macro_rules! with {
+        ($simd:expr) => {
+            $simd.vectorize(
+                #[inline(always)]
+                || sweep($simd, worker, frame, scene, corner, place, fault),
+            )
+        };
     }
-}
-
-/// As [`sweep`], in the instructions of `level`.
-#[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
-fn draw<const N: usize>(
-    level: Level,
-    worker: &mut Worker<N>,
-    frame: &Frame<N>,
-    scene: &Scene<N>,
-    corner: [u32; 2],
-    place: &mut [u32],
-    fault: Fault,
-) {
-    fearless_simd::dispatch!(level, simd => sweep(simd, worker, frame, scene, corner, place, fault));
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    if let Some(avx2) = level.as_avx2() {
+        with!(avx2);
+    } else if let Some(sse2) = level.as_sse2() {
+        with!(sse2);
+    }
+    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+    fearless_simd::dispatch!(level, simd => with!(simd));
 }
 
 /// Sets up, orders and draws the cells of a tile.

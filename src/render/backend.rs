@@ -153,7 +153,8 @@ impl Backend {
     pub(super) fn forget(&mut self, part: Part) {
         match self {
             Backend::Walk => {}
-            Backend::Project(sweep) => sweep.forget(part),
+            Backend::Project(sweep) if part != Part::Points => sweep.forget_values(),
+            Backend::Project(_) => {}
             Backend::WalkOnDevice(traverse) => traverse.forget(part),
             Backend::ProjectOnDevice(project) => project.forget(part),
         }

@@ -3,6 +3,7 @@
 use super::reader::kind;
 use super::second::{LightJson, Second, ShadeJson, TableJson, WidgetJson};
 use super::{DepthImage, Opaque, Scalars, Scene};
+use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::field::{Association, Component};
 use crate::image::npy::Npy;
@@ -52,7 +53,7 @@ pub(super) struct File {
     #[serde(default)]
     blend: BlendJson,
     background: Option<[f64; 3]>,
-    engine: Option<String>,
+    engine: Option<Engine>,
     device: Option<Value>,
     integral: Option<Value>,
     projection: Option<Map<String, Value>>,
@@ -263,10 +264,8 @@ impl File {
         if let Some(depth) = &self.depth {
             check_name("depth.file", &depth.file.to_string_lossy())?;
         }
-        for (key, name) in
-            [("engine", self.engine.as_deref()), ("device", self.device.as_ref().and_then(Value::as_str))]
-        {
-            name.map_or(Ok(()), |name| check_name(key, name))?;
+        if let Some(name) = self.device.as_ref().and_then(Value::as_str) {
+            check_name("device", name)?;
         }
         for (i, knot) in self.color.iter().flatten().enumerate() {
             check_color(&format!("color[{i}]"), &knot[1..])?;

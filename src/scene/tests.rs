@@ -59,7 +59,7 @@ fn every_key_is_known() {
     assert_eq!(scene.transfer.emission(), Emission::Direct { scale: 0.3 });
     assert_eq!(scene.transfer.convention(), Convention::Opacity);
     assert!(!scene.transfer.clamp());
-    assert_eq!(scene.engine.as_deref(), Some("traverse"));
+    assert_eq!(scene.engine, Some(Engine::Traverse));
     let (view, _) = scene.view().unwrap();
     assert_eq!(view.blend(), Blend::Maximum);
     let ray = view.ray(2, 4);

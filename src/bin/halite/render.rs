@@ -14,7 +14,7 @@ use halite::integral::choice::{Choice, Form};
 use halite::io::Time;
 use halite::mesh::{Mesh, cells::Tetrahedra};
 use halite::project::Switches;
-use halite::render::{self, Renderer};
+use halite::render::{Engine, Renderer};
 use halite::scene::{Scalars, Scene, automatic, missing};
 use halite::view::{Blend, ClippingPlane};
 use std::path::{Path, PathBuf};
@@ -120,8 +120,8 @@ pub(crate) struct Request {
     #[command(flatten)]
     camera: camera::Options,
 
-    /// How rays find their cells
-    #[arg(long, help_heading = "Engine")]
+    /// How frames are drawn: traverse (rays walk from cell to cell), project (cells are sorted and projected), or auto
+    #[arg(long, value_name = "ENGINE", value_parser = variant::named::<Engine>, help_heading = "Engine")]
     engine: Option<Engine>,
     /// Where the work is done: auto, cpu, or a device's index, UUID or part of its name; HALITE_DEVICE overrides auto
     #[arg(long, value_name = "DEVICE", help_heading = "Engine")]
@@ -142,23 +142,6 @@ enum Of {
 enum Blending {
     Composite,
     Maximum,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum Engine {
-    Auto,
-    Traverse,
-    Project,
-}
-
-impl From<Engine> for render::Engine {
-    fn from(engine: Engine) -> Self {
-        match engine {
-            Engine::Auto => render::Engine::Auto,
-            Engine::Traverse => render::Engine::Traverse,
-            Engine::Project => render::Engine::Project,
-        }
-    }
 }
 
 pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
@@ -350,9 +333,7 @@ impl Job {
 impl Request {
     /// The scene that the input is, if it is one.
     pub(crate) fn scene(&self) -> Result<Option<Scene>> {
-        let Some(scene) = input::scene(&self.input)? else { return Ok(None) };
-        check_engine(&scene).with_context(|| self.input.display().to_string())?;
-        Ok(Some(scene))
+        input::scene(&self.input)
     }
 
     /// Refuses a picture that there is no memory for, before a mesh is read.
@@ -375,8 +356,7 @@ impl Request {
 
     /// A renderer on `device`, with the engine and its switches that were asked for.
     pub(crate) fn renderer(&self, threads: usize, scene: Option<&Scene>, device: DeviceChoice) -> Result<Renderer> {
-        let named = scene.and_then(|s| Engine::from_str(s.engine.as_deref()?, true).ok());
-        let engine = self.engine.or(named).unwrap_or(Engine::Auto);
+        let engine = self.engine.or(scene.and_then(|s| s.engine)).unwrap_or_default();
         let others = self.variant.given().join(", ");
         if !others.is_empty() && !matches!(engine, Engine::Project) {
             if self.engine.is_some() {
@@ -384,7 +364,6 @@ impl Request {
             }
             tracing::warn!("the projection engine alone has {others}, and it does not draw: --engine project");
         }
-        let engine = engine.into();
         let mut renderer = Renderer::with_engine(threads, device, engine)?;
         let (order, sampling) = (self.reconstruction.unwrap_or_default(), self.sampling.unwrap_or_default());
         if order == Order::Exact && sampling != Sampling::Voxels {
@@ -482,20 +461,4 @@ impl Request {
             Blending::Maximum => Blend::Maximum,
         })
     }
-}
-
-/// Refuses what a scene asks for and Halite has not: what options ask for, clap has checked.
-fn check_engine(scene: &Scene) -> Result<()> {
-    fn check<T: ValueEnum>(what: &str, name: &str) -> Result<()> {
-        if T::from_str(name, true).is_err() {
-            let known = T::value_variants().iter().filter_map(ValueEnum::to_possible_value);
-            let known = known.map(|v| v.get_name().to_owned()).collect::<Vec<_>>().join(", ");
-            bail!("{what}: \"{name}\" is not known here; there is {known}");
-        }
-        Ok(())
-    }
-    if let Some(name) = &scene.engine {
-        check::<Engine>("engine", name)?;
-    }
-    Ok(())
 }

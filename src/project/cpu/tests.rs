@@ -109,3 +109,23 @@ fn the_order_is_right_nearly_everywhere() {
         assert!(redrawn as f64 <= 1e-3 * covered as f64, "{name}: {redrawn} of {covered} pixels drawn again");
     }
 }
+
+/// 16 bits number the lines of a function; the walk has no such limit.
+#[test]
+fn functions_of_very_many_points_are_left_to_the_walk() {
+    let mesh = generate::hexahedra(2);
+    let mut renderers = [Engine::Project, Engine::Traverse].map(|engine| renderer(&mesh, engine));
+    let field = Field::from_array(&mesh.point_arrays()[0], Association::Point, Component::All).unwrap();
+    let [lo, hi] = field.range(0);
+    let knot = |i: u32| lo + (hi - lo) * f64::from(i) / 70_000.0;
+    let opacity = (0..=70_000).map(|i| (knot(i), f64::from(i % 2))).collect();
+    let transfer = TransferFunction::new(vec![(lo, [1.0; 3])], opacity, 1.0).unwrap();
+    let view = view(dvec3(3.0, 2.0, 4.0), [24; 2]);
+    let images = renderers.each_mut().map(|renderer| {
+        renderer.set_transfer(&transfer);
+        renderer.render(&view, &|_| {}).unwrap()
+    });
+    let handed_over = renderers[0].stats().sweep.as_ref().and_then(|s| s.handed_over.as_deref());
+    assert_eq!(handed_over, Some("the transfer function has too many points"));
+    assert_eq!(images[0].pixels, images[1].pixels);
+}
