@@ -9,6 +9,8 @@
 
 mod grids;
 mod numbers;
+mod transfer;
+mod views;
 
 use crate::error::{Error, Result};
 use crate::field::{Association, Component, Field};
@@ -20,13 +22,13 @@ use crate::integral::choice::Form;
 use crate::memory;
 use crate::mesh::cells::name;
 use crate::mesh::{Array, Cells, Mesh, Polyhedra, Values};
-use crate::transfer::{Convention, TransferFunction};
-use crate::view::{Blend, Camera, ClippingPlane, DepthBuffer, DepthKind, Projection, View};
-use bridge::{ArrayInfo, CameraSpec, CellCount, FieldSpec, IntegralSpec, Numbers, Stats, TransferSpec, Type, ViewSpec};
+use bridge::{ArrayInfo, CellCount, FieldSpec, IntegralSpec, Numbers, Stats, TransferSpec, Type, ViewSpec};
 use glam::{DMat4, DVec3};
 use grids::{add_grid_array, new_grid, set_grid};
 use numbers::{cast, indices, point_ids, triples, values};
 use std::path::Path;
+use transfer::transfer;
+use views::view;
 
 #[cxx::bridge(namespace = "halite::bridge")]
 #[allow(missing_docs, reason = "private to the library; halite.h documents what it offers")]
@@ -82,6 +84,52 @@ mod bridge {
         unit_distance: f64,
         /// VTK's convention of image data, not that of unstructured grids.
         slab: bool,
+        /// (g, factor) for each knot of the function of the second variable that multiplies extinction; none if empty.
+        gradient_opacity: &'a [f64],
+        /// As scenes write them, in the place of colour and opacity; none if empty.
+        widgets: Vec<String>,
+        /// Red, green, blue and opacity of each texel over the scalar and the second variable, in the place of colour and
+        /// opacity; none if empty. Columns and rows, and the ranges of both variables.
+        table: &'a [f64],
+        table_size: [usize; 2],
+        table_ranges: [f64; 4],
+        /// The power of silhouettes, if such are drawn.
+        has_silhouette: bool,
+        silhouette: f64,
+        shade: ShadeSpec,
+        lights: Vec<LightSpec>,
+    }
+
+    struct ShadeSpec {
+        /// Without it, the rest says nothing.
+        is_lit: bool,
+        ambient: f64,
+        diffuse: f64,
+        specular: f64,
+        power: f64,
+        two_sided: bool,
+        reflected: bool,
+    }
+
+    #[derive(Debug, Clone, Copy)]
+    enum LightKind {
+        Headlight,
+        Direction,
+        Position,
+    }
+
+    struct LightSpec {
+        kind: LightKind,
+        /// Where it goes, or where it is.
+        vector: [f64; 3],
+        color: [f64; 3],
+        intensity: f64,
+        attenuation: [f64; 3],
+        /// The angle is in degrees; without a cone the rest says nothing.
+        has_cone: bool,
+        axis: [f64; 3],
+        angle: f64,
+        exponent: f64,
     }
 
     /// Names are those of scenes; empty ones, and a table of 0 x 0 x 0 texels, mean the default.
@@ -174,7 +222,7 @@ mod bridge {
         fn set_grid(session: &mut Session, grid: &Grid, matrix: [f64; 16]) -> Result<()>;
         fn move_points(session: &mut Session, points: Numbers, matrix: [f64; 16]) -> Result<bool>;
         fn move_mesh(session: &mut Session, mesh: &Mesh, matrix: [f64; 16]) -> Result<bool>;
-        fn set_field(session: &mut Session, spec: FieldSpec, numbers: Numbers) -> Result<()>;
+        fn set_field(session: &mut Session, spec: FieldSpec, numbers: Numbers, second: Numbers) -> Result<()>;
         fn set_mesh_field(session: &mut Session, mesh: &Mesh, index: usize, component: i32) -> Result<()>;
         fn set_transfer(session: &mut Session, spec: TransferSpec) -> Result<()>;
         fn render(session: &mut Session, spec: ViewSpec, pixels: &mut [f32], progress: &Progress) -> Result<bool>;
@@ -368,27 +416,39 @@ fn component(code: i32) -> Component {
     }
 }
 
-fn set_field(session: &mut Session, spec: FieldSpec, numbers: Numbers) -> Result<()> {
+/// Draws an array; `second`, if there is any of it, is the second variable, with one value each.
+fn set_field(session: &mut Session, spec: FieldSpec, numbers: Numbers, second: Numbers) -> Result<()> {
+    session.guarded(|s| {
+        s.set_field(|| {
+            let own = field(&spec, &numbers)?;
+            if second.bytes.is_empty() {
+                return Ok(own);
+            }
+            let of_second = FieldSpec { name: "the second variable", components: 1, component: 0, ..spec };
+            own.with_second(field(&of_second, &second)?)
+        })
+    })
+}
+
+fn field(spec: &FieldSpec, numbers: &Numbers) -> Result<Field> {
     let (of, what) = (association(spec.of_cells), component(spec.component));
     macro_rules! from {
         ($t:ty) => {
-            cast::<$t>(&numbers).and_then(|v| Field::from_slice(spec.name, v, spec.components, of, what))
+            cast::<$t>(numbers).and_then(|v| Field::from_slice(spec.name, v, spec.components, of, what))
         };
     }
-    session.guarded(|s| {
-        s.set_field(|| match numbers.kind {
-            Type::I8 => from!(i8),
-            Type::U8 => from!(u8),
-            Type::I16 => from!(i16),
-            Type::U16 => from!(u16),
-            Type::I32 => from!(i32),
-            Type::U32 => from!(u32),
-            Type::I64 => from!(i64),
-            Type::U64 => from!(u64),
-            Type::F32 => from!(f32),
-            _ => from!(f64),
-        })
-    })
+    match numbers.kind {
+        Type::I8 => from!(i8),
+        Type::U8 => from!(u8),
+        Type::I16 => from!(i16),
+        Type::U16 => from!(u16),
+        Type::I32 => from!(i32),
+        Type::U32 => from!(u32),
+        Type::I64 => from!(i64),
+        Type::U64 => from!(u64),
+        Type::F32 => from!(f32),
+        _ => from!(f64),
+    }
 }
 
 fn set_mesh_field(session: &mut Session, mesh: &Mesh, index: usize, code: i32) -> Result<()> {
@@ -400,10 +460,7 @@ fn set_mesh_field(session: &mut Session, mesh: &Mesh, index: usize, code: i32) -
 
 fn set_transfer(session: &mut Session, spec: TransferSpec) -> Result<()> {
     session.guarded(|s| {
-        let color = spec.color.as_chunks().0.iter().map(|&[x, r, g, b]| (x, [r, g, b])).collect();
-        let opacity = spec.opacity.as_chunks().0.iter().map(|&[x, a]| (x, a)).collect();
-        let convention = if spec.slab { Convention::Opacity } else { Convention::Extinction };
-        s.set_transfer(&TransferFunction::new(color, opacity, spec.unit_distance)?.with_convention(convention));
+        s.set_transfer(&transfer(&spec)?);
         Ok(())
     })
 }
@@ -428,40 +485,6 @@ fn render(session: &mut Session, spec: ViewSpec, pixels: &mut [f32], progress: &
         }
         Ok(true)
     })
-}
-
-fn view(spec: &ViewSpec) -> Result<View> {
-    let size = [spec.width, spec.height];
-    let view = if spec.by_matrices {
-        View::from_matrices(rows(spec.to_eye), rows(spec.to_clip), size)?
-    } else {
-        camera(&spec.camera, size)?
-    };
-    let blend = if spec.maximum { Blend::Maximum } else { Blend::Composite };
-    let vectors =
-        |p: &[f64; 6]| ClippingPlane { origin: DVec3::new(p[0], p[1], p[2]), normal: DVec3::new(p[3], p[4], p[5]) };
-    let view = view.with_blend(blend).with_clipping_planes(spec.planes.as_chunks().0.iter().map(vectors).collect())?;
-    if spec.depths.is_empty() {
-        return Ok(view);
-    }
-    let w = spec.width as usize;
-    // The far plane ends nothing that the clipping range does not end.
-    let values = |row: &[f32]| row.iter().map(|&d| if d < 1.0 { f64::from(d) } else { 1.0 }).collect::<Vec<_>>();
-    let rows = spec.depths.chunks(w);
-    let values = if spec.bottom_up { rows.rev().flat_map(values).collect() } else { rows.flat_map(values).collect() };
-    view.with_depth(DepthBuffer { kind: DepthKind::Window, values })
-}
-
-fn camera(spec: &CameraSpec, size: [u32; 2]) -> Result<View> {
-    let [position, focal_point, view_up] = [spec.position, spec.focal_point, spec.view_up].map(DVec3::from_array);
-    let number = spec.angle_or_scale;
-    let projection = if spec.parallel {
-        Projection::Parallel { parallel_scale: number }
-    } else {
-        Projection::Perspective { view_angle: number }
-    };
-    let view = View::new(Camera { position, focal_point, view_up, projection }, size)?;
-    if spec.near < spec.far { view.with_clipping_range([spec.near, spec.far]) } else { Ok(view) }
 }
 
 fn stats(session: &Session) -> Result<Stats> {

@@ -19,7 +19,7 @@ use halite::mesh::{Array, Mesh, Values, generate};
 use halite::reference::Reference;
 use halite::render::{self, Renderer};
 use halite::transfer::bivariate::{OPEN, Shape, Sine, Table, Wave, Widget};
-use halite::transfer::shading::{Light, Origin, Shade};
+use halite::transfer::shading::{Cone, Highlight, Light, Origin, Shade};
 use halite::transfer::{Bivariate, Convention, Emission, Shading, TransferFunction};
 use halite::view::{Blend, Camera, Projection, View};
 
@@ -54,15 +54,31 @@ fn knots() -> TransferFunction {
 }
 
 fn shade(power: f64, two_sided: bool) -> Shade {
-    Shade { ambient: 0.2, diffuse: 0.7, specular: 0.5, power, two_sided }
+    Shade { ambient: 0.2, diffuse: 0.7, specular: 0.5, power, two_sided, ..Shade::default() }
 }
 
 fn lit(transfer: TransferFunction, shade: Shade, origins: &[Origin]) -> TransferFunction {
     let light = |(i, &origin): (usize, &Origin)| {
         let color = if i == 0 { [1.0; 3] } else { [0.4, 0.7, 1.0] };
-        Light { origin, color, intensity: 0.9 }
+        Light { origin, color, intensity: 0.9, ..Light::default() }
     };
     let lights = origins.iter().enumerate().map(light).collect();
+    transfer.with_shading(Shading::default().with_lights(shade, lights).unwrap())
+}
+
+/// Light of a position inside the mesh, within a cone and weaker with the distance; and highlights of reflected light.
+fn spot(transfer: TransferFunction, power: f64, exponent: f64) -> TransferFunction {
+    let cone = Some(Cone { axis: DVec3::new(-1.0, -1.0, 0.2), angle: 25.0, exponent });
+    let lights = vec![
+        Light {
+            origin: Origin::Position(DVec3::new(0.7, 0.8, 0.1)),
+            attenuation: [0.3, 0.5, 0.2],
+            cone,
+            ..Light::default()
+        },
+        Light { origin: Origin::Direction(DVec3::new(0.2, -1.0, 0.5)), intensity: 0.4, ..Light::default() },
+    ];
+    let shade = Shade { highlight: Highlight::Reflected, ..shade(power, true) };
     transfer.with_shading(Shading::default().with_lights(shade, lights).unwrap())
 }
 
@@ -137,6 +153,8 @@ fn functions() -> Vec<(&'static str, TransferFunction)> {
         ("one side", lit(knots(), shade(8.0, false), &[from[0], Origin::Headlight])),
         ("two lights", lit(of(mix()), shade(20.0, true), &from)),
         ("direct light", direct(lit(knots(), shade(5.0, true), &from[..1]))),
+        ("a spot", spot(knots(), 9.0, 3.0)),
+        ("a wide highlight and a cone that ends at once", spot(of(mix()), 1.0, 0.0)),
         ("silhouette", silhouette(knots(), 2.0)),
         ("a silhouette of 3.5", silhouette(of(vec![gaussian()]), 3.5)),
     ]

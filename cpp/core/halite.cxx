@@ -428,12 +428,12 @@ void Renderer::setField(const Mesh& mesh, const std::string& name, int component
   throw Error("the mesh has no array called \"" + name + "\"");
 }
 
-void Renderer::setField(
-  const std::string& name, Association association, std::size_t components, int component, Numbers n)
+void Renderer::setField(const std::string& name, Association association, std::size_t components, int component,
+  Numbers n, const Numbers* second)
 {
   Inner::Run(this->Data, [&](bridge::Session& session) {
-    bridge::set_field(
-      session, { str(name), association == Association::Cells, components, component }, numbers(name.c_str(), n));
+    bridge::set_field(session, { str(name), association == Association::Cells, components, component },
+      numbers(name.c_str(), n), numbers("the second variable", second ? *second : Numbers(nullptr, 0, n.type)));
   });
 }
 
@@ -448,10 +448,43 @@ void Renderer::setTransferFunction(const TransferFunction& function)
   {
     opacity.insert(opacity.end(), { knot.scalar, knot.opacity });
   }
+  std::vector<double> factors, texels;
+  for (const auto& knot : function.gradientOpacity)
+  {
+    factors.insert(factors.end(), { knot.secondVariable, knot.factor });
+  }
+  const Table2D table = function.table.value_or(Table2D());
+  for (const auto& texel : table.texels)
+  {
+    texels.insert(texels.end(), texel.begin(), texel.end());
+  }
+  if (function.table && texels.empty())
+  {
+    throw Error("the table over the scalar and the second variable has no texels");
+  }
   Inner::Run(this->Data, [&](bridge::Session& session) {
+    rust::Vec<rust::String> widgets;
+    for (const std::string& widget : function.widgets)
+    {
+      widgets.push_back(rust::String::lossy(widget));
+    }
+    const Shade shade = function.shade.value_or(Shade());
+    rust::Vec<bridge::LightSpec> lights;
+    for (const Light& l : shade.lights)
+    {
+      const Light::Cone cone = l.cone.value_or(Light::Cone());
+      lights.push_back({ static_cast<bridge::LightKind>(l.kind), l.vector, l.color, l.intensity, l.attenuation,
+        l.cone.has_value(), cone.axis, cone.angle, cone.exponent });
+    }
+    const bridge::ShadeSpec spec = { function.shade.has_value(), shade.ambient, shade.diffuse, shade.specular,
+      shade.power, shade.twoSided, shade.reflected };
     bridge::set_transfer(session,
       { slice("colour knots", color.data(), color.size()), slice("opacity knots", opacity.data(), opacity.size()),
-        function.unitDistance, function.convention == OpacityConvention::Opacity });
+        function.unitDistance, function.convention == OpacityConvention::Opacity,
+        slice("gradient opacity", factors.data(), factors.size()), std::move(widgets),
+        slice("texels", texels.data(), texels.size()), { table.columns, table.rows },
+        { table.scalarRange[0], table.scalarRange[1], table.secondRange[0], table.secondRange[1] },
+        function.silhouette.has_value(), function.silhouette.value_or(0), spec, std::move(lights) });
   });
 }
 

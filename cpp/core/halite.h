@@ -237,6 +237,56 @@ enum class OpacityConvention
   Opacity
 };
 
+/// Colour and opacity over the scalar s and the second variable g: bilinear between the centres of texels, constant beyond them.
+struct Table2D
+{
+  std::size_t columns = 0, rows = 0;
+  /// Row by row from the least g: red, green and blue in [0, 1], not multiplied by opacity, and opacity.
+  std::vector<std::array<double, 4>> texels;
+  /// From edge to edge of the outer texels.
+  std::array<double, 2> scalarRange = { 0, 1 }, secondRange = { 0, 1 };
+};
+
+/// A light; nothing throws a shadow.
+struct Light
+{
+  enum class Kind
+  {
+    /// From the eye, along each ray.
+    Headlight,
+    Direction,
+    Position
+  };
+  struct Cone
+  {
+    std::array<double, 3> axis = { 0, 0, -1 };
+    /// Between axis and side, in degrees; above 0, and 90 at most.
+    double angle = 30;
+    /// Of the cosine of the angle to the axis, by whose power the light gets weaker.
+    double exponent = 1;
+  };
+  Kind kind = Kind::Headlight;
+  /// Where a direction goes, or where a position is, in world coordinates.
+  std::array<double, 3> vector = { 0, 0, -1 };
+  std::array<double, 3> color = { 1, 1, 1 };
+  double intensity = 1;
+  /// (a, b, c): a position that is r away is 1/(a + b r + c r^2) as strong.
+  std::array<double, 3> attenuation = { 1, 0, 0 };
+  /// Of a position: what it lights.
+  std::optional<Cone> cone;
+};
+
+/// Phong's terms, with the unit vector of the gradient as normal.
+struct Shade
+{
+  double ambient = 0.1, diffuse = 0.7, specular = 0.2, power = 10;
+  /// Else only the side that the gradient points to is lit.
+  bool twoSided = true;
+  /// Whether highlights are of the reflected vector, as in VTK's shaders, and not of that half way between light and eye.
+  bool reflected = false;
+  std::vector<Light> lights = { Light() };
+};
+
 /// Colour and opacity, piecewise linear between knots that ascend in the scalar; constant beyond them. Two knots at one
 /// scalar are a step.
 struct TransferFunction
@@ -251,10 +301,26 @@ struct TransferFunction
     double scalar;
     double opacity;
   };
+  struct GradientKnot
+  {
+    double secondVariable;
+    double factor;
+  };
   std::vector<ColorKnot> color;
   std::vector<OpacityKnot> opacity;
   double unitDistance = 1;
   OpacityConvention convention = OpacityConvention::Extinction;
+  /// What extinction is multiplied by, over the second variable: the length of the field's gradient, or another array. Constant
+  /// beyond the knots; 1 if there are none.
+  std::vector<GradientKnot> gradientOpacity;
+  /// Widgets over both variables in the place of colour and opacity, as scene files have them:
+  /// {"type": "gaussian", "center": [0.5, 2], "sigma": [0.1, 1], "color": [1, 0.5, 0], "opacity": 0.8}.
+  std::vector<std::string> widgets;
+  /// In the place of colour and opacity, too.
+  std::optional<Table2D> table;
+  /// p, where extinction is multiplied by (1 - |n . d|)^p: n is the unit vector of the gradient, d the direction of the ray.
+  std::optional<double> silhouette;
+  std::optional<Shade> shade;
 };
 
 /// VTK's camera, in world coordinates.
@@ -375,8 +441,10 @@ public:
   bool movePoints(const Mesh& mesh, const Matrix* matrix = nullptr);
   /// Draws an array of the mesh.
   void setField(const Mesh& mesh, const std::string& name, int component = 0);
-  /// Draws numbers, in tuples of `components`, one for each point or cell of the mesh or grid.
-  void setField(const std::string& name, Association, std::size_t components, int component, Numbers);
+  /// Draws numbers, in tuples of `components`, one for each point or cell of the mesh or grid. If `second` is given, it has one
+  /// number for each, which is the second variable in the place of the length of the gradient.
+  void setField(const std::string& name, Association, std::size_t components, int component, Numbers,
+    const Numbers* second = nullptr);
   void setTransferFunction(const TransferFunction&);
   /// Integrates in another form from the next frame on, which waits for its table if one is named. Where the transfer
   /// function alone changes, frames are exact until the new table is built, which happens meanwhile.

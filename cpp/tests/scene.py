@@ -187,9 +187,10 @@ def interpolate(knots, s):
 
 
 def truth(r, size, low=(0, 0, 0), high=(1, 1, 1), field=lambda p: p[..., 2], opacity=((0, 1),), color=WHITE, unit=1.0,
-          matrix=np.eye(4), keep=lambda p: True, maximum=False, steps=300, slab=False, hue=None):
+          matrix=np.eye(4), keep=lambda p: True, maximum=False, steps=300, slab=False, hue=None, factor=lambda p: 1,
+          lit=lambda rgb, world, along: rgb):
     """The picture of a box under `matrix`, in bytes, of what `keep` says of points in the world. Colours are those of another
-    field, `hue`, if it is given."""
+    field, `hue`, if it is given. Extinction is multiplied by `factor`, and colours are `lit`, at points of the world."""
     start, end = rays(r, size)
     inverse = np.linalg.inv(matrix)
     to_model = lambda p: p @ inverse[:3, :3].T + inverse[:3, 3]
@@ -221,7 +222,8 @@ def truth(r, size, low=(0, 0, 0), high=(1, 1, 1), field=lambda p: p[..., 2], opa
         top = np.where(seen, best, 0)
         a = interpolate(opacity, top)[..., 0].clip(0, 1) * seen
         return 255 * np.concatenate([interpolate(color, top) * a[..., None], a[..., None]], -1)
-    tau = (-np.log1p(-alpha) if slab else alpha) / unit * length
+    rgb = lit(rgb, world, ((end - start) / np.linalg.norm(end - start, axis=-1, keepdims=True))[..., None, :])
+    tau = (-np.log1p(-alpha) if slab else alpha) / unit * length * factor(world)
     through = np.exp(-np.cumsum(tau, -1))
     before = np.concatenate([np.ones_like(through[..., :1]), through[..., :-1]], -1)
     light = np.sum((before - through)[..., None] * rgb, -2)

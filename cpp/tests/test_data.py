@@ -329,16 +329,23 @@ def test_projection_engine():
 
 def test_what_is_not_honoured_is_said_once():
     steep = opacities([(0, 0), (1, 1)])
-    cases = dict(shade=lambda p: p.ShadeOn(), gradient=lambda p: p.SetGradientOpacity(steep),
-                 functions=lambda p: p.SetTransferFunctionMode(p.TF_2D))
-    for name, ask in cases.items():
-        v = volume(lattice(2, field=SLANT), WAVES, RAMP)
+    # Cells have no gradient.
+    cases = dict(shade=(True, lambda p: p.ShadeOn()), gradient=(True, lambda p: p.SetGradientOpacity(steep)),
+                 functions=(False, lambda p: p.SetTransferFunctionMode(p.TF_2D)))
+    for name, (of_cells, ask) in cases.items():
+        g = lattice(2, field=SLANT)
+        if of_cells:
+            add(g, np.full(8, 0.5), "c", "cell")
+        v = volume(g, WAVES, RAMP)
+        if of_cells:
+            v.GetMapper().SetScalarModeToUseCellData()
         ask(v.GetProperty())
         errors = Errors(v.GetMapper())
         w, r = scene(v)
         for k in range(3):
             r.GetActiveCamera().Azimuth(1)
-            check(pixels(w), truth(r, (64, 64), **BOX), what=name)
+            field = (lambda p: np.full(p.shape[:-1], 0.5)) if of_cells else BOX["field"]
+            check(pixels(w), truth(r, (64, 64), **{**BOX, "field": field}), what=name)
         assert len(errors) == 1, name
 
 

@@ -47,6 +47,19 @@ Content::Content(const halite::Settings& settings, vtkDataSet* grid, vtkDataArra
   this->ChooseFunction(volume, convention, functions);
 }
 
+void Content::Shade(const Shading& shading)
+{
+  halite::TransferFunction& f = this->Function;
+  f.gradientOpacity = shading.GradientOpacity;
+  f.table = shading.Table;
+  f.widgets = shading.Widgets;
+  f.silhouette = shading.Silhouette;
+  f.shade = shading.Shade;
+  this->FunctionKey << shading.Key();
+  this->Second = shading.Second;
+  this->FieldKey << static_cast<std::uint64_t>(this->Second ? this->Second->GetMTime() : 0);
+}
+
 Key Content::Whole() const
 {
   Key whole;

@@ -4,6 +4,7 @@
 
 #include "Functions.h"
 #include "Key.h"
+#include "Shading.h"
 #include "vtkHaliteCompatibility.h"
 
 #include "halite.h"
@@ -29,6 +30,8 @@ struct Content
   halite::Association Association = halite::Association::Points;
   int Component = 0;
   halite::TransferFunction Function;
+  // The second variable, if it is not the length of the gradient.
+  vtkSmartPointer<vtkDataArray> Second;
   // What each of these depends on.
   Key SettingsKey, IntegralKey, MeshKey, PlacementKey, FieldKey, FunctionKey;
 
@@ -36,6 +39,9 @@ struct Content
   // if there is no array, or VTK has no meaning for it.
   Content(const halite::Settings& settings, vtkDataSet* grid, vtkDataArray* array, int cellFlag, vtkVolume* volume,
     halite::OpacityConvention convention, Functions::Cache& functions);
+
+  // Has it drawn with a second variable and light.
+  void Shade(const Shading& shading);
 
   // What a picture depends on, but for the view.
   Key Whole() const;

@@ -103,9 +103,10 @@ void Core::Hold(const Content& content)
     const halite::Numbers numbers = view.Numbers(content.Array, content.Component);
     const bool isOne = numbers.count == static_cast<std::size_t>(content.Array->GetNumberOfTuples());
     const char* name = content.Array->GetName();
+    const halite::Numbers second = content.Second ? view.Numbers(content.Second, 0) : halite::Numbers(nullptr, 0, {});
     this->Do(Field, [&] {
-      this->Renderer->setField(
-        name ? name : "", content.Association, isOne ? 1 : n, isOne && n > 1 ? 0 : content.Component, numbers);
+      this->Renderer->setField(name ? name : "", content.Association, isOne ? 1 : n,
+        isOne && n > 1 ? 0 : content.Component, numbers, content.Second ? &second : nullptr);
     });
     ++this->Done.Fields;
     this->FieldKey = content.FieldKey;

@@ -57,6 +57,7 @@ vtkHaliteMapper::~vtkHaliteMapper()
   this->SetTableTexels(nullptr);
   this->SetPolynomialAlpha(nullptr);
   this->SetCylinderPlanes(nullptr);
+  this->SetTransfer2DYAxisArray(nullptr);
 }
 
 void vtkHaliteMapper::SetInputData(vtkDataSet* grid)
@@ -159,7 +160,7 @@ void vtkHaliteMapper::Internals::DrawIn(vtkOpenGLRenderWindow* window, vtkRender
   {
     return;
   }
-  this->WarnOfUnsupported(volume->GetProperty());
+  this->WarnOfUnsupported();
 
   Clock clock(this->Self.TimeToDraw);
   Key wanted;
@@ -169,7 +170,7 @@ void vtkHaliteMapper::Internals::DrawIn(vtkOpenGLRenderWindow* window, vtkRender
     {
       throw std::runtime_error("the window has no OpenGL context: Render() of the window makes one");
     }
-    const Content content = this->Choose(grid, volume);
+    const Content content = this->Choose(grid, volume, renderer, isMaximum);
     // Where surfaces end rays there is nothing between two pixels.
     const double distance = pass ? 1 : this->Self.ImageSampleDistance;
     SceneView view(renderer, static_cast<int>(std::ceil(viewport.Width / distance)),
@@ -243,6 +244,29 @@ void vtkHaliteMapper::ReleaseGraphicsResources(vtkWindow* window)
   this->Superclass::ReleaseGraphicsResources(window);
 }
 
+void vtkHaliteMapper::AddWidget(const char* widget)
+{
+  if (widget)
+  {
+    this->Widgets.push_back(widget);
+    this->Modified();
+  }
+}
+
+void vtkHaliteMapper::RemoveAllWidgets()
+{
+  if (!this->Widgets.empty())
+  {
+    this->Widgets.clear();
+    this->Modified();
+  }
+}
+
+int vtkHaliteMapper::GetNumberOfWidgets()
+{
+  return static_cast<int>(this->Widgets.size());
+}
+
 vtkIdType vtkHaliteMapper::GetNumberOfFrames()
 {
   return this->Inner->Core.GetCounts().Frames;
@@ -298,6 +322,12 @@ void vtkHaliteMapper::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "CylinderPlanes: " << Internals::Text(this->CylinderPlanes) << "\n";
   static const char* const conventions[] = { "Extinction", "Opacity", "ByInput" };
   os << indent << "OpacityConvention: " << conventions[this->OpacityConvention] << "\n";
+  os << indent << "Transfer2DYAxisArray: " << Internals::Text(this->Transfer2DYAxisArray) << "\n";
+  os << indent << "SilhouettePower: " << this->SilhouettePower << "\n";
+  for (const std::string& widget : this->Widgets)
+  {
+    os << indent << "Widget: " << widget << "\n";
+  }
   os << indent << "ImageSampleDistance: " << this->ImageSampleDistance << "\n";
   os << indent << "NumberOfThreads: " << this->NumberOfThreads << "\n";
   os << indent << "UseFloatingPointFrameBuffer: " << (this->UseFloatingPointFrameBuffer ? "On" : "Off") << "\n";

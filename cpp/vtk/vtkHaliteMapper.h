@@ -12,8 +12,9 @@
  * or the magnitude is drawn as the colour function's vector mode says; off, two components are the values of the colour and opacity
  * functions, four are red, green, blue and opacity themselves (as in vtkProjectedTetrahedraMapper); both blend modes;
  * clipping planes; the volume's matrix, mirror images included; any camera; opaque geometry, wherever it is, and with depth peeling
- * of volumes translucent geometry (except with the maximum, which goes over it). Not honoured, and said
- * once as a warning, are shading, gradient opacity and 2D transfer functions.
+ * of volumes translucent geometry (except with the maximum, which goes over it). Of unstructured and structured grids whose points
+ * have one value each, also shading by the lights of the renderer, gradient opacity over the length of the gradient in world units,
+ * and 2D transfer functions (Song et al. 2009); others are drawn without, which is said once as a warning.
  *
  * It is a vtkProjectedTetrahedraMapper so that it can take that one's place through VTK's object factory (see SetOverride). What
  * VTK's own implementation can be told is accepted; sort and frame buffer format change nothing here.
@@ -31,6 +32,8 @@
 #include "vtkProjectedTetrahedraMapper.h"
 
 #include <memory> // for std::unique_ptr
+#include <string> // for std::string
+#include <vector> // for std::vector
 
 #ifdef VTK_ABI_NAMESPACE_BEGIN
 VTK_ABI_NAMESPACE_BEGIN
@@ -160,6 +163,35 @@ public:
 
   ///@{
   /**
+   * The array that takes the place of the gradient's length as second variable, beside the one that is drawn; none by default. An
+   * image that is a 2D transfer function with an origin or a spacing of its own has the centres of its texels where its points are.
+   * Others lie over the range of the scalars, and over that of this array, or lengths of the gradient up to a quarter of the range.
+   */
+  vtkSetStringMacro(Transfer2DYAxisArray);
+  vtkGetStringMacro(Transfer2DYAxisArray);
+  ///@}
+
+  ///@{
+  /**
+   * Widgets over the scalar and the second variable, whose colours and opacities add up in the place of the property's functions, each
+   * as scene files have them: {"type": "gaussian", "center": [0.5, 2], "sigma": [0.1, 1], "color": [1, 0.5, 0], "opacity": 0.8}.
+   */
+  void AddWidget(const char* widget);
+  void RemoveAllWidgets();
+  int GetNumberOfWidgets();
+  ///@}
+
+  ///@{
+  /**
+   * p, where extinction is multiplied by (1 - |n.d|)^p, with n the unit vector of the gradient and d the direction of the ray: what
+   * faces the eye becomes clear, and outlines are left. Negative (the default): it is not.
+   */
+  vtkSetMacro(SilhouettePower, double);
+  vtkGetMacro(SilhouettePower, double);
+  ///@}
+
+  ///@{
+  /**
    * Distance between rays, in pixels: with 2, a fourth of the pixels is computed, and enlarged. 1 by default.
    */
   vtkSetClampMacro(ImageSampleDistance, double, 1.0, 100.0);
@@ -240,6 +272,9 @@ protected:
   char* PolynomialAlpha = nullptr;
   char* CylinderPlanes = nullptr;
   int OpacityConvention = BY_INPUT;
+  char* Transfer2DYAxisArray = nullptr;
+  std::vector<std::string> Widgets;
+  double SilhouettePower = -1;
   double ImageSampleDistance = 1.0;
   int NumberOfThreads = 0;
   bool UseFloatingPointFrameBuffer = true;

@@ -6,11 +6,13 @@
 #include "Peeling.h"
 
 #include "vtkCamera.h"
+#include "vtkCellData.h"
 #include "vtkCommand.h"
 #include "vtkDataArray.h"
 #include "vtkDataSet.h"
 #include "vtkOpenGLRenderPass.h"
 #include "vtkOpenGLRenderWindow.h"
+#include "vtkPointData.h"
 #include "vtkRenderer.h"
 #include "vtkVolume.h"
 #include "vtkVolumeCollection.h"
@@ -101,21 +103,8 @@ vtkHaliteMapper::Internals::Frame& vtkHaliteMapper::Internals::FrameOf(vtkRender
   return f;
 }
 
-void vtkHaliteMapper::Internals::WarnOfUnsupported(vtkVolumeProperty* property)
+void vtkHaliteMapper::Internals::WarnOfUnsupported()
 {
-  if (property->GetShade(0))
-  {
-    this->WarnOnce("Halite does not shade: the volume emits light and absorbs it");
-  }
-  // With 2D functions, VTK says that there is gradient opacity.
-  if (property->GetTransferFunctionMode() == vtkVolumeProperty::TF_2D)
-  {
-    this->WarnOnce("Halite does not draw 2D transfer functions; the 1D functions are used");
-  }
-  else if (property->HasGradientOpacity(0) && !property->GetDisableGradientOpacity(0))
-  {
-    this->WarnOnce("Halite does not draw gradient opacity");
-  }
   const int blend = this->Self.GetBlendMode();
   if (blend != COMPOSITE_BLEND && blend != MAXIMUM_INTENSITY_BLEND)
   {
@@ -124,7 +113,62 @@ void vtkHaliteMapper::Internals::WarnOfUnsupported(vtkVolumeProperty* property)
   }
 }
 
-Content vtkHaliteMapper::Internals::Choose(vtkDataSet* grid, vtkVolume* volume)
+void vtkHaliteMapper::Internals::Shade(Content& content, vtkVolume* volume, vtkRenderer* renderer, bool isMaximum)
+{
+  const std::string name = Text(this->Self.Transfer2DYAxisArray);
+  vtkDataArray* second = nullptr;
+  if (!name.empty())
+  {
+    vtkDataSetAttributes* arrays = content.Association == halite::Association::Points
+      ? static_cast<vtkDataSetAttributes*>(content.Grid->GetPointData())
+      : content.Grid->GetCellData();
+    second = arrays->GetArray(name.c_str());
+    if (!second)
+    {
+      throw halite::Error("Transfer2DYAxisArray: there is no array \"" + name + "\" beside the one that is drawn");
+    }
+  }
+  vtkVolumeProperty* property = volume->GetProperty();
+  if (property->GetTransferFunctionMode() == vtkVolumeProperty::TF_2D && !property->GetTransferFunction2D(0))
+  {
+    this->WarnOnce("the property has no 2D transfer function: its functions of one variable are used");
+  }
+  Shading shading(property, renderer, content.Array, second);
+  shading.Widgets = this->Self.Widgets;
+  if (this->Self.SilhouettePower >= 0)
+  {
+    shading.Silhouette = this->Self.SilhouettePower;
+  }
+  if (!shading.Widgets.empty())
+  {
+    shading.Table.reset();
+    shading.Second = second;
+  }
+  if (!shading.IsThere() || isMaximum)
+  {
+    return;
+  }
+  if (content.IsGrid)
+  {
+    this->WarnOnce("Halite draws regular and rectilinear grids without light, gradient opacity and 2D functions yet");
+  }
+  else if (content.Component == halite::AllComponents)
+  {
+    this->WarnOnce(
+      "dependent components have no gradient: they are drawn without light, gradient opacity and 2D functions");
+  }
+  else if (content.Association == halite::Association::Cells && shading.NeedsGradient())
+  {
+    this->WarnOnce(
+      "values of cells have no gradient: they are drawn without light, gradient opacity and 2D functions of it");
+  }
+  else
+  {
+    content.Shade(shading);
+  }
+}
+
+Content vtkHaliteMapper::Internals::Choose(vtkDataSet* grid, vtkVolume* volume, vtkRenderer* renderer, bool isMaximum)
 {
   Clock clock(this->Self.PrepareTime);
   halite::Settings settings;
@@ -145,7 +189,9 @@ Content vtkHaliteMapper::Internals::Choose(vtkDataSet* grid, vtkVolume* volume)
   const bool isSlab = this->Self.OpacityConvention == vtkHaliteMapper::OPACITY ||
     (this->Self.OpacityConvention == vtkHaliteMapper::BY_INPUT && MeshView::IsGrid(grid));
   const auto convention = isSlab ? halite::OpacityConvention::Opacity : halite::OpacityConvention::Extinction;
-  return Content(settings, grid, array, cellFlag, volume, convention, this->Knots);
+  Content content(settings, grid, array, cellFlag, volume, convention, this->Knots);
+  this->Shade(content, volume, renderer, isMaximum);
+  return content;
 }
 
 void vtkHaliteMapper::Internals::Mend()

@@ -130,14 +130,16 @@ struct vtkHaliteMapper::Internals
   void WarnOnce(const std::string& what);
   // Warnings of the core.
   void ReportWarnings();
-  // What of the property is not drawn.
-  void WarnOfUnsupported(vtkVolumeProperty* property);
+  // The blend mode, if it is none that is drawn.
+  void WarnOfUnsupported();
+  // Has a second variable and light drawn, as far as what is drawn has them.
+  void Shade(Content& content, vtkVolume* volume, vtkRenderer* renderer, bool isMaximum);
 
   Presenter& PresenterOf(vtkOpenGLRenderWindow* window);
   Frame& FrameOf(vtkRenderer* renderer, vtkVolume* volume);
   // Lets go what was made for a window: at once, or when the frame that is at work is over.
   void Release(vtkWindow* window);
-  Content Choose(vtkDataSet* grid, vtkVolume* volume);
+  Content Choose(vtkDataSet* grid, vtkVolume* volume, vtkRenderer* renderer, bool isMaximum);
   // Draws once the renderer has finished.
   void Defer(vtkRenderer* renderer, vtkVolume* volume);
 

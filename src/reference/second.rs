@@ -3,7 +3,7 @@
 use super::{COMPONENTS, Interval, Light, Reference};
 use crate::field::{Association, Field, Kind};
 use crate::transfer::bivariate::{Shape, Source, Widget};
-use crate::transfer::shading::{Origin, Shading};
+use crate::transfer::shading::{Highlight, Origin, Shading};
 use crate::transfer::{Bivariate, Convention, Emission, TransferFunction};
 use glam::{DMat3, DVec3};
 use std::collections::HashMap;
@@ -113,7 +113,7 @@ impl Reference<'_> {
                 let sample = Sample { s, g, vector: DVec3::new(x, y, z), place, along };
                 self.density(&sample).map(|d| d * length)
             };
-            for cut in self.cuts(&interval).windows(2) {
+            for cut in self.cuts(&interval, origin, along).windows(2) {
                 // Sides of steps belong to the piece.
                 let [from, to] = [cut[0], cut[1]];
                 let inside = |x: f64| density(from + (to - from) * x).map(|d| d * (to - from));
@@ -186,11 +186,24 @@ impl Reference<'_> {
             };
             let falls = side(normal.dot(to));
             if falls > 0.0 {
-                let intensity = DVec3::from(light.color) * light.intensity;
-                let half = to - at.along;
+                let mut intensity = DVec3::from(light.color) * light.intensity;
+                if let Origin::Position(p) = light.origin {
+                    let delta = (p - self.centre - at.place).length();
+                    let [a, b, c] = light.attenuation;
+                    intensity /= a + b * delta + c * delta * delta;
+                    if let Some(cone) = &light.cone {
+                        let cosine = -to.dot(cone.axis) / cone.axis.length();
+                        let inside = cosine.acos() <= cone.angle.to_radians();
+                        intensity *= if inside { cosine.max(0.0).powf(cone.exponent) } else { 0.0 };
+                    }
+                }
                 diffuse += intensity * falls;
-                if half.length() > 1e-12 {
-                    specular += intensity * side(normal.dot(half.normalize())).powf(shade.power);
+                let shines = match shade.highlight {
+                    Highlight::Half => side(normal.dot((to - at.along).normalize_or_zero())),
+                    Highlight::Reflected => (2.0 * normal.dot(to) * normal - to).dot(-at.along).max(0.0),
+                };
+                if shines > 0.0 || shade.highlight == Highlight::Reflected {
+                    specular += intensity * shines.powf(shade.power);
                 }
             }
         }
@@ -198,8 +211,26 @@ impl Reference<'_> {
     }
 
     /// Where between 0 and 1 the interval's function may turn or jump.
-    fn cuts(&self, interval: &Interval) -> Vec<f64> {
+    fn cuts(&self, interval: &Interval, origin: DVec3, along: DVec3) -> Vec<f64> {
         let mut cuts = vec![0.0, 1.0];
+        for light in self.transfer.shading().map(Shading::lights).unwrap_or_default() {
+            let (Origin::Position(p), Some(cone)) = (light.origin, light.cone) else { continue };
+            let is_inside = |u: f64| {
+                let t = interval.t[0] + (interval.t[1] - interval.t[0]) * u;
+                (origin + along * t + self.centre - p).angle_between(cone.axis) <= cone.angle.to_radians()
+            };
+            for k in 0..256 {
+                let [mut a, mut b] = [k, k + 1].map(|k| f64::from(k) / 256.0);
+                let first = is_inside(a);
+                if is_inside(b) != first {
+                    for _ in 0..60 {
+                        let middle = f64::midpoint(a, b);
+                        if is_inside(middle) == first { a = middle } else { b = middle }
+                    }
+                    cuts.push(b);
+                }
+            }
+        }
         // Where a linear function has a value.
         let mut cut = |ends: [f64; 2], value: f64| {
             let u = (value - ends[0]) / (ends[1] - ends[0]);

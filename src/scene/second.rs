@@ -4,7 +4,7 @@ use super::read;
 use crate::error::{Error, Result};
 use crate::image::npy::Npy;
 use crate::transfer::bivariate::{Bivariate, OPEN, Shape, Sine, Table, Wave, Widget};
-use crate::transfer::shading::{Light, Origin, Shade, Shading};
+use crate::transfer::shading::{Cone, Highlight, Light, Origin, Shade, Shading};
 use serde::de::Visitor;
 use serde::{Deserialize, Deserializer};
 use serde_json::Value;
@@ -175,6 +175,8 @@ pub(super) struct ShadeJson {
     specular: f64,
     power: f64,
     two_sided: Option<bool>,
+    #[serde(default)]
+    highlight: Highlight,
 }
 
 #[derive(Deserialize)]
@@ -186,6 +188,17 @@ pub(super) struct LightJson {
     position: Option<[f64; 3]>,
     color: Option<[f64; 3]>,
     intensity: Option<f64>,
+    attenuation: Option<[f64; 3]>,
+    cone: Option<ConeJson>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ConeJson {
+    direction: [f64; 3],
+    angle: f64,
+    #[serde(default)]
+    exponent: f64,
 }
 
 #[derive(Deserialize)]
@@ -212,7 +225,8 @@ impl LightJson {
         };
         let plain = Light::default();
         let (color, intensity) = (self.color.unwrap_or(plain.color), self.intensity.unwrap_or(plain.intensity));
-        Ok(Light { origin, color, intensity })
+        let cone = self.cone.map(|c| Cone { axis: c.direction.into(), angle: c.angle, exponent: c.exponent });
+        Ok(Light { origin, color, intensity, attenuation: self.attenuation.unwrap_or(plain.attenuation), cone })
     }
 }
 
@@ -280,6 +294,7 @@ impl Second {
                 specular: s.specular,
                 power: s.power,
                 two_sided: s.two_sided.unwrap_or(true),
+                highlight: s.highlight,
             };
             let lights = self.lights.map_or(Ok(vec![Light::default()]), |lights| {
                 let light =

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::transfer::bivariate::{OPEN, Shape, Sine, Source, Wave};
-use crate::transfer::shading::{Light, Origin, Shade, Shading};
+use crate::transfer::shading::{Cone, Highlight, Light, Origin, Shade, Shading};
 use crate::transfer::{Bivariate, Convention};
 use glam::DVec3;
 
@@ -72,7 +72,7 @@ fn light_is_read() {
     let transfer = scene.unwrap().transfer;
     let shading = transfer.shading().unwrap();
     assert_eq!((shading.silhouette(), shading.lights()), (Some(2.5), &[Light::default()][..]));
-    let shade = Shade { ambient: 0.1, diffuse: 0.7, specular: 0.2, power: 20.0, two_sided: true };
+    let shade = Shade { ambient: 0.1, diffuse: 0.7, specular: 0.2, power: 20.0, ..Shade::default() };
     assert_eq!(shading.shade(), Some(&shade));
     let scene = with(&format!(
         r#"{LOOK}, "shade": {{"ambient": 0, "diffuse": 1, "specular": 0, "power": 1, "two_sided": false}}, "lights": [
@@ -81,9 +81,23 @@ fn light_is_read() {
     ));
     let transfer = scene.unwrap().transfer;
     let lights = transfer.shading().map(Shading::lights).unwrap();
-    assert_eq!(lights[0], Light { origin: Origin::Direction(-DVec3::Y), color: [1.0, 0.5, 0.0], intensity: 2.0 });
+    assert_eq!(
+        lights[0],
+        Light { origin: Origin::Direction(-DVec3::Y), color: [1.0, 0.5, 0.0], intensity: 2.0, ..Light::default() }
+    );
     assert_eq!(lights[1], Light { origin: Origin::Position(DVec3::new(1.0, 2.0, 3.0)), ..Light::default() });
     assert_eq!(lights[2], Light { intensity: 0.5, ..Light::default() });
+    let scene = with(&format!(
+        r#"{LOOK}, "shade": {{"ambient": 0, "diffuse": 1, "specular": 0, "power": 1, "highlight": "reflected"}}, "lights": [
+        {{"type": "position", "position": [1, 2, 3], "attenuation": [1, 0, 0.5],
+          "cone": {{"direction": [0, 0, -1], "angle": 30, "exponent": 2}}}}]"#
+    ));
+    let transfer = scene.unwrap().transfer;
+    let shading = transfer.shading().unwrap();
+    assert_eq!(shading.shade().map(|s| s.highlight), Some(Highlight::Reflected));
+    let cone = Some(Cone { axis: -DVec3::Z, angle: 30.0, exponent: 2.0 });
+    let origin = Origin::Position(DVec3::new(1.0, 2.0, 3.0));
+    assert_eq!(shading.lights(), [Light { origin, attenuation: [1.0, 0.0, 0.5], cone, ..Light::default() }]);
 }
 
 #[test]

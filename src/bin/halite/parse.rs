@@ -60,7 +60,7 @@ pub(crate) fn shade(text: &str) -> Result<Shade, String> {
     if [ambient, diffuse, specular, power].iter().any(|x| *x < 0.0) {
         return Err("the shares of ambient, diffuse and specular light and the power are 0 or more".into());
     }
-    Ok(Shade { ambient, diffuse, specular, power, two_sided: true })
+    Ok(Shade { ambient, diffuse, specular, power, ..Shade::default() })
 }
 
 /// Any finite number.

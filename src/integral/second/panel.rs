@@ -5,19 +5,24 @@
 //! Runge–Kutta Processes, 1964), which for this system takes no iteration.
 
 use super::{Bounded, Gathered, Ready, Scratch, Second, Segment, closed};
-use crate::transfer::shading::{Origin, Shade};
+use crate::transfer::shading::{Cone, Highlight, Origin, Shade, Shading};
 use crate::transfer::{Convention, bivariate::Shape, interpolate};
 use glam::DVec3;
 
 /// Nodes of a panel.
 const NODES: usize = 4;
+/// The share of what may change in a panel up to which two nodes are enough: they are exact for degree 3.
+const EASY: f64 = 0.2;
+/// The greatest depth of a panel of two nodes.
+const SHALLOW: f64 = 0.05;
 /// The greatest depth of a panel.
 const DEEPEST: f64 = 1.5;
 /// By how many σ a Gaussian's argument moves in a panel, and by how many radians a sinusoid's, at most.
 const STEP: [f64; 2] = [1.2, 1.5];
 /// By what factor the argument of a power or a logarithm changes between the nodes of a panel at most.
 const FACTOR: f64 = 2.0;
-/// By what angle a normal turns in a panel at most; for highlights this over the root of their power.
+/// By what angle a normal, or the way to a light, turns in a panel at most; for highlights and cones this over the root of
+/// their power.
 const ANGLES: [f64; 2] = [0.35, 1.2];
 /// The shortest panels that are halved as they bend, and those that are shortened as they are deep, as shares of a segment.
 const SHORTEST: f64 = 1e-7;
@@ -25,32 +30,73 @@ const SHORTEST: f64 = 1e-7;
 const THINNEST: f64 = 1e-14;
 /// Transmittance of a segment below which f32 tells nothing from nothing.
 const DARK: f64 = 1e-12;
+/// Powers from which on a highlight begins so smoothly that no panel must.
+const SMOOTH: f64 = 6.0;
+/// See [`SHORTEST`]: of panels that are halved towards the edge of a highlight.
+const EDGE: f64 = 1e-4;
 /// Places of a segment that are one.
 const SAME: f64 = 1e-12;
 
-/// Gauss's rule on [0, 1], and the integrals of the polynomials through its nodes from 0 to each of them.
+/// Gauss's rule of `N` nodes on [0, 1], and the integrals of the polynomials through its nodes from 0 to each of them.
 #[derive(Debug, Clone)]
-pub(super) struct Rule {
-    nodes: [f64; NODES],
-    weights: [f64; NODES],
-    to_node: [[f64; NODES]; NODES],
+struct Rule<const N: usize> {
+    nodes: [f64; N],
+    weights: [f64; N],
+    to_node: [[f64; N]; N],
 }
 
-impl Default for Rule {
+impl<const N: usize> Rule<N> {
+    fn new(nodes: [f64; N], weights: [f64; N]) -> Self {
+        let polynomial = |j: usize, x: f64| -> f64 {
+            let factor = |k: usize| (x - nodes[k]) / (nodes[j] - nodes[k]);
+            (0..N).filter(|&k| k != j).map(factor).product()
+        };
+        // The rule itself is exact for them.
+        let integral = |i: usize, j: usize| -> f64 {
+            (0..N).map(|k| nodes[i] * weights[k] * polynomial(j, nodes[i] * nodes[k])).sum()
+        };
+        let to_node = std::array::from_fn(|i| std::array::from_fn(|j| integral(i, j)));
+        Rule { nodes, weights, to_node }
+    }
+
+    /// Adds a panel of length `h`, of `depth`, with such nodes.
+    #[inline(always)]
+    fn add(&self, nodes: &[Node; N], h: f64, depth: f64, direct: bool, light: &mut Gathered<f64>) {
+        let (mut emitted, mut absorbed) = ([0.0; 3], 0.0);
+        for i in 0..N {
+            let before: f64 = (0..N).map(|j| self.to_node[i][j] * nodes[j].density[3]).sum::<f64>() * h;
+            let seen = (-before).exp() * self.weights[i] * h;
+            for (sum, q) in emitted.iter_mut().zip(nodes[i].density) {
+                *sum += seen * q;
+            }
+            absorbed += seen * nodes[i].density[3];
+        }
+        let opacity = -(-depth).exp_m1();
+        // What one colour emits is that times the opacity, whatever the nodes miss of it.
+        let right = if !direct && absorbed > 0.0 { opacity / absorbed } else { 1.0 };
+        light.add(emitted.map(|c| c * right), opacity);
+    }
+
+    /// The depth of a panel of length `h`.
+    fn depth(&self, nodes: &[Node; N], h: f64) -> f64 {
+        (0..N).map(|i| self.weights[i] * nodes[i].density[3]).sum::<f64>() * h
+    }
+}
+
+/// The rules of two and of four nodes.
+#[derive(Debug, Clone)]
+pub(super) struct Rules {
+    two: Rule<2>,
+    four: Rule<NODES>,
+}
+
+impl Default for Rules {
     fn default() -> Self {
         let root = |sign: f64| (3.0 / 7.0 + sign * 2.0 / 7.0 * 1.2_f64.sqrt()).sqrt();
         let nodes = [-root(1.0), -root(-1.0), root(-1.0), root(1.0)].map(|x| 0.5 + 0.5 * x);
         let weights = [-1.0, 1.0, 1.0, -1.0].map(|sign: f64| (18.0 + sign * 30_f64.sqrt()) / 72.0);
-        let polynomial = |j: usize, x: f64| -> f64 {
-            let factor = |k: usize| (x - nodes[k]) / (nodes[j] - nodes[k]);
-            (0..NODES).filter(|&k| k != j).map(factor).product()
-        };
-        // The rule itself is exact for them.
-        let integral = |i: usize, j: usize| -> f64 {
-            (0..NODES).map(|k| nodes[i] * weights[k] * polynomial(j, nodes[i] * nodes[k])).sum()
-        };
-        let to_node = std::array::from_fn(|i| std::array::from_fn(|j| integral(i, j)));
-        Rule { nodes, weights, to_node }
+        let two = [-1.0, 1.0].map(|sign: f64| 0.5 + sign / 12_f64.sqrt());
+        Rules { two: Rule::new(two, [0.5; 2]), four: Rule::new(nodes, weights) }
     }
 }
 
@@ -155,7 +201,11 @@ impl Second {
                     Origin::Position(p) => {
                         let (to, step) = (p - place, along * -length);
                         let (a, b, c) = (turn.dot(step), vector.dot(step) + turn.dot(to), vector.dot(to));
-                        next = roots(a, b, c).into_iter().filter(|&x| x > u + SAME).fold(next, f64::min);
+                        let beyond = |next: f64, x: f64| if x > u + SAME { next.min(x) } else { next };
+                        next = roots(a, b, c).into_iter().fold(next, beyond);
+                        if let Some(cone) = &light.cone {
+                            next = cone_sides(cone, -to, -step).into_iter().fold(next, beyond);
+                        }
                     }
                 }
             }
@@ -192,7 +242,13 @@ impl Second {
     /// Adds panels until the piece is done, and counts them.
     fn panels(&self, segment: &Segment, piece: &Piece, light: &mut Gathered<f64>) -> u64 {
         let [begin, end] = piece.ends;
-        let longest = (end - begin) / ((end - begin) * self.rate(segment, piece)).ceil().max(1.0);
+        let bend = (end - begin) * self.rate(segment, piece);
+        // A logarithm is no low polynomial.
+        let may_be_easy = bend < EASY && self.convention == Convention::Extinction;
+        if may_be_easy && self.add_easy(segment, piece, light) {
+            return 1;
+        }
+        let longest = (end - begin) / bend.ceil().max(1.0);
         let (mut u, mut h, mut count) = (begin, longest, 0);
         while u < end && light.through > DARK {
             let left = end - u;
@@ -204,34 +260,44 @@ impl Second {
             } else {
                 h
             };
-            let nodes = self.rule.nodes.map(|x| self.node(segment, piece, u + h * x));
-            let depth: f64 = (0..NODES).map(|i| self.rule.weights[i] * nodes[i].density[3]).sum::<f64>() * h;
+            // What lights do is judged before it is computed.
+            if h > SHORTEST && !self.is_evenly_lit(segment, u, h, 1.0) {
+                h *= 0.5;
+                continue;
+            }
+            let rule = &self.rules.four;
+            let nodes = rule.nodes.map(|x| self.node(segment, piece, u + h * x));
+            let depth = rule.depth(&nodes, h);
             if depth > DEEPEST && h > THINNEST {
                 h *= (1.0 / depth).clamp(0.01, 0.6);
                 continue;
             }
-            if h > SHORTEST && !self.is_tame(segment, &nodes, [u, u + h]) {
+            if h > SHORTEST && !self.is_tame(segment, &nodes, [u, u + h], 1.0) {
                 h *= 0.5;
                 continue;
             }
-            let (mut emitted, mut absorbed) = ([0.0; 3], 0.0);
-            for i in 0..NODES {
-                let before: f64 = (0..NODES).map(|j| self.rule.to_node[i][j] * nodes[j].density[3]).sum::<f64>() * h;
-                let seen = (-before).exp() * self.rule.weights[i] * h;
-                for (sum, q) in emitted.iter_mut().zip(nodes[i].density) {
-                    *sum += seen * q;
-                }
-                absorbed += seen * nodes[i].density[3];
-            }
-            let opacity = -(-depth).exp_m1();
-            // What one colour emits is that times the opacity, whatever the nodes miss of it.
-            let right = if self.direct.is_none() && absorbed > 0.0 { opacity / absorbed } else { 1.0 };
-            light.add(emitted.map(|c| c * right), opacity);
+            rule.add(&nodes, h, depth, self.direct.is_some(), light);
             count += 1;
             u += h;
             h = (2.0 * h).min(longest);
         }
         count
+    }
+
+    /// Adds all of a piece as one panel of two nodes, if little enough changes in it; else nothing, and says so.
+    fn add_easy(&self, segment: &Segment, piece: &Piece, light: &mut Gathered<f64>) -> bool {
+        let ([begin, end], rule) = (piece.ends, &self.rules.two);
+        let h = end - begin;
+        if !self.is_evenly_lit(segment, begin, h, EASY) {
+            return false;
+        }
+        let nodes = rule.nodes.map(|x| self.node(segment, piece, begin + h * x));
+        let depth = rule.depth(&nodes, h);
+        let is_easy = depth <= SHALLOW && self.is_tame(segment, &nodes, [begin, end], EASY);
+        if is_easy {
+            rule.add(&nodes, h, depth, self.direct.is_some(), light);
+        }
+        is_easy
     }
 
     /// Panels per unit of u that the bends of widgets ask for.
@@ -245,16 +311,18 @@ impl Second {
         piece.active.iter().map(rate).fold(0.0, f64::max)
     }
 
-    /// Whether what is no polynomial changes little enough between two places.
-    fn is_tame(&self, segment: &Segment, nodes: &[Node; NODES], [from, to]: [f64; 2]) -> bool {
-        let [least, most] = nodes.iter().fold([f64::MAX, 0.0], |[l, m], n| [n.left.min(l), n.left.max(m)]);
-        if self.convention == Convention::Opacity && most > FACTOR * least {
-            return false;
+    /// Whether what is no polynomial changes little enough between two places: by a `share` of what may change in a panel.
+    fn is_tame(&self, segment: &Segment, nodes: &[Node], [from, to]: [f64; 2], share: f64) -> bool {
+        let factor = 1.0 + (FACTOR - 1.0) * share;
+        if self.convention == Convention::Opacity {
+            let [least, most] = nodes.iter().fold([f64::MAX, 0.0], |[l, m], n| [n.left.min(l), n.left.max(m)]);
+            if most > factor * least {
+                return false;
+            }
         }
         let Some(shading) = &self.shading else { return true };
         let [a, b] = [from, to].map(|u| segment.vector + segment.turn * u);
-        let power = shading.shade().filter(|s| s.specular > 0.0).map_or(1.0, |s| s.power);
-        let angle = ANGLES[0].min(ANGLES[1] / power.max(1.0).sqrt());
+        let angle = shading.shade().map_or(ANGLES[0], angle) * share;
         let product = a.length() * b.length();
         if product > self.flat * self.flat && a.dot(b) < angle.cos() * product {
             return false;
@@ -264,11 +332,42 @@ impl Second {
                 let v = segment.vector + segment.turn * u;
                 (1.0 - v.dot(segment.along).abs() / v.length().max(self.flat)).max(1e-5)
             };
-            let edges = self.rule.nodes.map(|x| edge(from + (to - from) * x));
+            let edges = self.rules.four.nodes.map(|x| edge(from + (to - from) * x));
             let [least, most] = edges.iter().fold([f64::MAX, 0.0], |[l, m], e| [e.min(l), e.max(m)]);
-            return most <= FACTOR * least;
+            return most <= factor * least;
         }
         true
+    }
+
+    /// Whether lights that have a position, and highlights that begin, change little enough in a panel of length `h` at `u`:
+    /// by a `share` of what may change in one.
+    fn is_evenly_lit(&self, segment: &Segment, u: f64, h: f64, share: f64) -> bool {
+        let Some(shade) = self.shading.as_ref().and_then(Shading::shade) else { return true };
+        let Segment { vector, turn, place, along, length, .. } = *segment;
+        let begins =
+            shade.highlight == Highlight::Reflected && shade.specular > 0.0 && shade.power < SMOOTH && h > EDGE;
+        self.lights.iter().all(|light| {
+            let to = |u: f64| match light.origin {
+                Origin::Headlight => -along,
+                Origin::Direction(to) => to,
+                Origin::Position(p) => p - place - along * (length * u),
+            };
+            if let Origin::Position(_) = light.origin {
+                let (first, last) = (to(u), to(u + h));
+                let (near, far) = (first.length(), last.length());
+                let exponent = light.cone.map_or(1.0, |c| c.exponent);
+                let most = angle(shade).min(ANGLES[1] / exponent.max(1.0).sqrt()) * share;
+                let factor = 1.0 + (FACTOR - 1.0) * share;
+                if first.dot(last) < most.cos() * near * far || near.max(far) > factor * near.min(far) {
+                    return false;
+                }
+            }
+            let shines = |x: f64| {
+                let (normal, to) = (vector + turn * (u + h * x), to(u + h * x));
+                to.dot(along) * normal.length_squared() > 2.0 * normal.dot(to) * normal.dot(along)
+            };
+            !begins || [0.25, 0.5, 0.75, 1.0].iter().all(|&x| shines(x) == shines(0.0))
+        })
     }
 
     /// What is at `u`.
@@ -307,7 +406,7 @@ impl Second {
             let length = vector.length();
             let normal = (length > self.flat).then(|| vector / length);
             if let (Some(p), Some(n)) = (shading.silhouette(), normal) {
-                factor *= (1.0 - n.dot(segment.along).abs()).max(0.0).powf(p);
+                factor *= power((1.0 - n.dot(segment.along).abs()).max(0.0), p);
             }
             if let Some(shade) = shading.shade() {
                 let place = segment.place + segment.along * (segment.length * u);
@@ -334,31 +433,67 @@ impl Second {
         let side = |x: f64| if shade.two_sided { x.abs() } else { x.max(0.0) };
         let (mut diffuse, mut specular) = (DVec3::ZERO, DVec3::ZERO);
         for light in &self.lights {
-            let intensity = DVec3::from(light.color) * light.intensity;
-            let (falls, to) = match light.origin {
-                Origin::Headlight => (side(-normal.dot(along)), None),
-                Origin::Direction(to) => (side(normal.dot(to)), Some(to)),
+            let mut intensity = DVec3::from(light.color) * light.intensity;
+            let to = match light.origin {
+                Origin::Headlight => -along,
+                Origin::Direction(to) => to,
                 Origin::Position(p) => {
-                    let to = (p - place).normalize_or_zero();
-                    (side(normal.dot(to)), Some(to))
+                    intensity *= light.weakened(place - p, self.scale);
+                    (p - place).normalize_or_zero()
                 }
             };
+            let falls = side(normal.dot(to));
             if falls <= 0.0 {
                 continue;
             }
             diffuse += intensity * falls;
-            // Half way to a headlight is the way to it.
-            let shines = to.map_or(falls, |to| {
-                let half = to - along;
-                let length = half.length();
-                if length > 1e-12 { side(normal.dot(half)) / length } else { 0.0 }
-            });
-            if shade.specular > 0.0 && (to.is_none() || shines > 0.0) {
-                specular += intensity * shines.powf(shade.power);
+            if shade.specular == 0.0 {
+                continue;
             }
+            let shines = match (shade.highlight, light.origin) {
+                (Highlight::Reflected, _) => (to.dot(along) - 2.0 * normal.dot(to) * normal.dot(along)).max(0.0),
+                // Half way to a headlight is the way to it.
+                (Highlight::Half, Origin::Headlight) => falls,
+                (Highlight::Half, _) => {
+                    let half = to - along;
+                    let length = half.length();
+                    if length > 1e-12 { side(normal.dot(half)) / length } else { continue }
+                }
+            };
+            specular += intensity * power(shines, shade.power);
         }
         emitted * (shade.ambient + shade.diffuse * diffuse) + specular * (shade.specular * white)
     }
+}
+
+/// xᵖ, which for small whole powers is a few products.
+fn power(x: f64, p: f64) -> f64 {
+    if p.fract() == 0.0 && p <= 64.0 { x.powi(p as i32) } else { x.powf(p) }
+}
+
+/// By what angle normals may turn in a panel.
+fn angle(shade: &Shade) -> f64 {
+    // What is reflected turns twice as far as the normal, and once as far as the way to the light.
+    let power = match (shade.specular > 0.0, shade.highlight) {
+        (false, _) => 1.0,
+        (true, Highlight::Half) => shade.power,
+        (true, Highlight::Reflected) => 9.0 * shade.power,
+    };
+    ANGLES[0].min(ANGLES[1] / power.max(1.0).sqrt())
+}
+
+/// Where the line `from` + u `step`, of which the apex is the origin, passes through the side of a cone.
+fn cone_sides(cone: &Cone, from: DVec3, step: DVec3) -> [f64; 2] {
+    let (axis, cosine) = (cone.axis.normalize(), cone.angle.to_radians().cos());
+    if cone.angle == 90.0 {
+        return [-from.dot(axis) / step.dot(axis), f64::NAN];
+    }
+    let (p, q, square) = (from.dot(axis), step.dot(axis), cosine * cosine);
+    roots(
+        q * q - square * step.length_squared(),
+        2.0 * (p * q - square * from.dot(step)),
+        p * p - square * from.length_squared(),
+    )
 }
 
 /// The real roots of a x² + b x + c.
