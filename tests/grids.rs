@@ -310,7 +310,8 @@ fn orders_are_exact_for_their_degree() {
                 let made = rebuilt(&grid, &s, &transfer(), &view(), Reconstruction { order, sampling });
                 difference(&made, &image(&grid, &s, &transfer(), &view()))
             };
-            assert!(off(exact) < 2e-6, "{order:?} {sampling:?}: {:.1e}", off(exact));
+            // Hundreds of slabs are summed up in f32.
+            assert!(off(exact) < 4e-6, "{order:?} {sampling:?}: {:.1e}", off(exact));
             if sampling == Sampling::Voxels {
                 assert!(off(beyond) > 1e-3, "{order:?}: {:.1e}", off(beyond));
             }

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """Times one of VTK's own volume mappers on a scene, and writes its picture: a process of its own, so that its CPU seconds are its own.
 
-    python3 vtk_frames.py SCENE.json projected|bunyk VIEWS OUT.npy
+    python3 vtk_frames.py SCENE.json projected|bunyk|fixed|gpu VIEWS OUT.npy
+
+Of a scene of image data "fixed" and "gpu" are the mappers, with a sample for each pixel and voxel; opacity is per unit distance there.
 
 Prints one JSON object: wall and CPU seconds of each view, and VTK's version.
 """
@@ -15,16 +17,26 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkVersion
 from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction, vtkPlane  # noqa: F401
 from vtkmodules.vtkFiltersGeneral import vtkDataSetTriangleFilter
-from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
+from vtkmodules.vtkIOXML import vtkXMLImageDataReader, vtkXMLUnstructuredGridReader
 from vtkmodules.vtkRenderingCore import (vtkColorTransferFunction, vtkRenderer, vtkRenderWindow, vtkVolume, vtkVolumeProperty,
                                          vtkWindowToImageFilter)
-from vtkmodules.vtkRenderingVolume import vtkUnstructuredGridVolumeRayCastMapper
-from vtkmodules.vtkRenderingVolumeOpenGL2 import vtkOpenGLProjectedTetrahedraMapper
+from vtkmodules.vtkRenderingVolume import vtkFixedPointVolumeRayCastMapper, vtkUnstructuredGridVolumeRayCastMapper
+from vtkmodules.vtkRenderingVolumeOpenGL2 import vtkOpenGLGPUVolumeRayCastMapper, vtkOpenGLProjectedTetrahedraMapper
+
+
+IMAGES = {"fixed": vtkFixedPointVolumeRayCastMapper, "gpu": vtkOpenGLGPUVolumeRayCastMapper}
 
 
 def mapper_of(name):
     if name == "projected":
         return vtkOpenGLProjectedTetrahedraMapper()
+    if name in IMAGES:
+        mapper = IMAGES[name]()
+        mapper.AutoAdjustSampleDistancesOff()
+        mapper.LockSampleDistanceToInputSpacingOff()
+        mapper.SetSampleDistance(1)
+        mapper.SetImageSampleDistance(1)
+        return mapper
     mapper = vtkUnstructuredGridVolumeRayCastMapper()
     mapper.SetAutoAdjustSampleDistances(False)
     mapper.SetImageSampleDistance(1)
@@ -35,11 +47,11 @@ def main():
     scene_path, name, views, out = sys.argv[1:]
     with open(scene_path) as file:
         scene = json.load(file)
-    reader = vtkXMLUnstructuredGridReader()
+    reader = vtkXMLImageDataReader() if name in IMAGES else vtkXMLUnstructuredGridReader()
     reader.SetFileName(scene["mesh"])
     reader.Update()
     grid = reader.GetOutput()
-    if grid.GetCellType(0) != 10:
+    if name not in IMAGES and grid.GetCellType(0) != 10:
         split = vtkDataSetTriangleFilter()
         split.SetInputData(grid)
         split.Update()
@@ -54,7 +66,12 @@ def main():
     color, opacity, prop = vtkColorTransferFunction(), vtkPiecewiseFunction(), vtkVolumeProperty()
     for knot in scene["color"]:
         color.AddRGBPoint(*knot)
-    for knot in scene["opacity"]:
+    knots = np.array(scene["opacity"], float)
+    if name in IMAGES:
+        # The extinction's exponential, which these mappers take the logarithm of.
+        places = np.union1d(np.linspace(knots[0, 0], knots[-1, 0], 2001), knots[:, 0])
+        knots = np.stack([places, -np.expm1(-np.interp(places, *knots.T))], axis=1)
+    for knot in knots:
         opacity.AddPoint(*knot)
     prop.SetColor(color)
     prop.SetScalarOpacity(opacity)

@@ -1,5 +1,6 @@
 //! Rays: from voxel to voxel, and what each adds.
 
+use super::lanes;
 use super::reconstruction::{Order, Reconstruction, Sampling};
 use super::volume::{Samples, Volume};
 use crate::integral::cubic::{Cubic, Piece, trilinear};
@@ -15,7 +16,7 @@ const BAND: usize = 4;
 
 /// Transmittance below which a ray ends: what lies behind adds less than this times its colour to any channel. Direct
 /// emission has no such bound, and goes on as long as f32 can tell.
-const fn least_light(direct: bool) -> f64 {
+pub(super) const fn least_light(direct: bool) -> f64 {
     if direct { f32::MIN_POSITIVE as f64 } else { 1e-6 }
 }
 
@@ -34,20 +35,82 @@ pub(crate) struct Frame<'a> {
 /// Draws a frame on the current rayon pool; also says how many voxels its rays passed. What progress does not want any
 /// more stays empty.
 pub(crate) fn render(frame: &Frame) -> (Vec<[f32; 4]>, u64) {
+    let opacity = &frame.exact.opacity;
+    let visible = Visible::new(frame.exact, frame.samples.components);
+    let seen = match frame.view.blend() {
+        Blend::Composite => frame.samples.seen(|low, high| visible.shows(opacity.intervals(low, high))),
+        Blend::Maximum => frame.samples.seen(|_, _| true),
+    };
+    lanes::render(frame, &visible, &seen).unwrap_or_else(|| one_by_one(frame, &visible, &seen))
+}
+
+/// Draws a frame ray by ray, in f64: what there are no lanes for, and what tests judge these by.
+pub(super) fn one_by_one(frame: &Frame, visible: &Visible, seen: &[bool]) -> (Vec<[f32; 4]>, u64) {
     match frame.samples.components {
-        1 => Caster::<1>::new(frame).image(),
-        2 => Caster::<2>::new(frame).image(),
-        _ => Caster::<4>::new(frame).image(),
+        1 => Caster::<1> { frame, visible, seen }.image(),
+        2 => Caster::<2> { frame, visible, seen }.image(),
+        _ => Caster::<4> { frame, visible, seen }.image(),
     }
 }
 
-/// Casts the rays of a frame, of a field of `N` components.
+/// The ray of pixel (`i`, `j`) along the axes of the grid, o + t d, and between which t it is in the grid; if it is.
+pub(super) fn enter(frame: &Frame, i: u32, j: u32) -> Option<([f64; 3], [f64; 3], [f64; 2])> {
+    let Volume { axes, cells, to_axes, centre, .. } = frame.volume;
+    let ray = frame.view.ray(i, j);
+    // From the point of the ray that is nearest to the middle of the grid, so that no distance is great.
+    let offset = ray.origin - *centre;
+    let shift = -offset.dot(ray.direction);
+    let o = (*to_axes * (offset + ray.direction * shift)).to_array();
+    let d = (*to_axes * ray.direction).to_array();
+    let (mut t, mut end) = (ray.t_min - shift, ray.t_max - shift);
+    for a in 0..3 {
+        let [low, high] = [axes[a][0], axes[a][cells[a]]];
+        if d[a] == 0.0 {
+            // In a plane of the grid it belongs to the voxels behind that in index order.
+            if !(low..high).contains(&o[a]) {
+                return None;
+            }
+            continue;
+        }
+        let [near, far] = [(low - o[a]) / d[a], (high - o[a]) / d[a]];
+        (t, end) = (t.max(near.min(far)), end.min(near.max(far)));
+    }
+    (t < end).then_some((o, d, [t, end]))
+}
+
+/// Which intervals of a transfer function show anything.
+pub(super) struct Visible {
+    /// How many intervals of the opacity function before each do.
+    before: Vec<u32>,
+}
+
+impl Visible {
+    /// Of a field of so many components.
+    pub(super) fn new(exact: &Exact<f64>, components: usize) -> Self {
+        // Emission of its own may show whatever the opacity is.
+        let alone = exact.direct && components > 1;
+        let channels = if exact.direct { 4 } else { 1 };
+        let shows = |v: &[f64; 4]| alone || v[..channels].iter().any(|c| *c > 0.0);
+        let mut before = vec![0];
+        for w in exact.opacity.value.windows(2) {
+            before.push(before[before.len() - 1] + u32::from(shows(&w[0]) || shows(&w[1])));
+        }
+        Visible { before }
+    }
+
+    /// Whether anything shows on the intervals from one to another.
+    #[inline(always)]
+    pub(super) fn shows(&self, [first, last]: [usize; 2]) -> bool {
+        self.before[(last + 1).min(self.before.len() - 1)] > self.before[first]
+    }
+}
+
+/// Casts the rays of a frame, of a field of `N` components, one by one.
 struct Caster<'a, const N: usize> {
     frame: &'a Frame<'a>,
-    /// How many intervals of the opacity function before each show anything.
-    visible: Vec<u32>,
+    visible: &'a Visible,
     /// Whether a block shows anything.
-    seen: Vec<bool>,
+    seen: &'a [bool],
 }
 
 /// What a ray has gathered.
@@ -57,31 +120,7 @@ struct Gathered<const N: usize> {
     steps: u64,
 }
 
-impl<'a, const N: usize> Caster<'a, N> {
-    fn new(frame: &'a Frame<'a>) -> Self {
-        let Exact { opacity, direct, .. } = frame.exact;
-        // Emission of its own may show whatever the opacity is.
-        let alone = *direct && N > 1;
-        let channels = if *direct { 4 } else { 1 };
-        let shows = |v: &[f64; 4]| alone || v[..channels].iter().any(|c| *c > 0.0);
-        let mut visible = vec![0];
-        for w in opacity.value.windows(2) {
-            visible.push(visible[visible.len() - 1] + u32::from(shows(&w[0]) || shows(&w[1])));
-        }
-        let mut caster = Caster { frame, visible, seen: vec![] };
-        caster.seen = match frame.view.blend() {
-            Blend::Composite => frame.samples.seen(|low, high| caster.shows(opacity.intervals(low, high))),
-            Blend::Maximum => frame.samples.seen(|_, _| true),
-        };
-        caster
-    }
-
-    /// Whether anything shows on the intervals from one to another.
-    #[inline(always)]
-    fn shows(&self, [first, last]: [usize; 2]) -> bool {
-        self.visible[(last + 1).min(self.visible.len() - 1)] > self.visible[first]
-    }
-
+impl<const N: usize> Caster<'_, N> {
     fn image(&self) -> (Vec<[f32; 4]>, u64) {
         let [w, h] = self.frame.view.size().map(|n| n as usize);
         let mut pixels = vec![[0.0; 4]; w * h];
@@ -118,30 +157,9 @@ impl<'a, const N: usize> Caster<'a, N> {
 
     /// Follows the ray of pixel (`i`, `j`).
     fn trace(&self, i: u32, j: u32) -> Gathered<N> {
-        let Volume { axes, cells, to_axes, centre, scale, .. } = self.frame.volume;
+        let Volume { axes, cells, scale, .. } = self.frame.volume;
         let mut gathered = Gathered { light: Light::none(), largest: None, steps: 0 };
-        let ray = self.frame.view.ray(i, j);
-        // From the point of the ray that is nearest to the middle of the grid, so that no distance is great.
-        let offset = ray.origin - *centre;
-        let shift = -offset.dot(ray.direction);
-        let o = (*to_axes * (offset + ray.direction * shift)).to_array();
-        let d = (*to_axes * ray.direction).to_array();
-        let (mut t, mut end) = (ray.t_min - shift, ray.t_max - shift);
-        for a in 0..3 {
-            let [low, high] = [axes[a][0], axes[a][cells[a]]];
-            if d[a] == 0.0 {
-                // In a plane of the grid it belongs to the voxels behind that in index order.
-                if !(low..high).contains(&o[a]) {
-                    return gathered;
-                }
-                continue;
-            }
-            let [near, far] = [(low - o[a]) / d[a], (high - o[a]) / d[a]];
-            (t, end) = (t.max(near.min(far)), end.min(near.max(far)));
-        }
-        if t >= end {
-            return gathered;
-        }
+        let Some((o, d, [mut t, end])) = enter(self.frame, i, j) else { return gathered };
         if let Reconstruction { order, sampling: Sampling::Steps(step) } = self.frame.reconstruction
             && order != Order::Exact
         {
@@ -244,8 +262,8 @@ impl<'a, const N: usize> Caster<'a, N> {
     fn add(&self, cubics: &[Cubic; N], length: f64, gathered: &mut Gathered<N>) {
         let last = &cubics[N - 1];
         let [low, high] = last.bounds();
-        // A value that is not finite makes all of it so.
-        if !(low.is_finite() && high.is_finite()) {
+        // Of samples, one may be left out.
+        if !last.0.iter().all(|v| v.is_finite()) {
             return;
         }
         if self.frame.view.blend() == Blend::Maximum {
@@ -255,11 +273,11 @@ impl<'a, const N: usize> Caster<'a, N> {
             return;
         }
         let intervals = self.frame.exact.opacity.intervals(low, high);
-        if !self.shows(intervals) {
+        if !self.visible.shows(intervals) {
             return;
         }
         if N == 1 {
-            let shows = |i: usize| self.shows([i, i]);
+            let shows = |i: usize| self.visible.shows([i, i]);
             self.frame.exact.add_cubic(last, length, shows, &mut gathered.light);
         } else {
             self.several(cubics, length, &mut gathered.light);

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Voxels of a block along each axis, as a power of two.
-const BLOCK: usize = 3;
+pub(super) const BLOCK: usize = 3;
 
 /// Where the voxels of a grid are, and which of them are drawn.
 #[derive(Debug)]
@@ -28,8 +28,10 @@ pub(crate) struct Volume {
     pub(crate) scale: f64,
     /// From corner to corner, in world units.
     diagonal: f64,
+    /// Whether planes are as far from each other all along each axis.
+    pub(super) even: bool,
     /// A bit for each voxel that is left out; none if none is.
-    hidden: Option<Vec<u64>>,
+    pub(super) hidden: Option<Vec<u64>>,
 }
 
 impl Volume {
@@ -63,13 +65,14 @@ impl Volume {
             return Err(Error::Empty("all of its cells are ghosts or hidden".into()));
         }
         let diagonal = 2.0 * extent;
-        Ok(Volume { axes, inverse, cells: grid.cells(), to_axes, centre, scale, diagonal, hidden })
+        let even = axes.iter().all(|axis| is_even(axis));
+        Ok(Volume { axes, inverse, cells: grid.cells(), to_axes, centre, scale, diagonal, even, hidden })
     }
 
     /// Whether voxel `c` is left out.
     #[inline(always)]
     pub(super) fn is_hidden(&self, c: usize) -> bool {
-        self.hidden.as_ref().is_some_and(|bits| bits[c / 64] >> (c % 64) & 1 == 1)
+        self.hidden.as_ref().is_some_and(|bits| bits.get(c / 64).is_some_and(|word| word >> (c % 64) & 1 == 1))
     }
 
     /// From corner to corner, in world units.
@@ -83,7 +86,7 @@ impl Volume {
     }
 
     /// Number of points.
-    fn point_count(&self) -> usize {
+    pub(super) fn point_count(&self) -> usize {
         self.axes.iter().map(Vec::len).product()
     }
 
@@ -94,15 +97,25 @@ impl Volume {
     }
 }
 
+/// How far from its place a plane of an even axis may be, in widths of a voxel.
+const UNEVEN: f64 = 1e-9;
+
+/// Whether these planes are as far from each other all along.
+fn is_even(axis: &[f64]) -> bool {
+    let (first, last) = (axis[0], axis[axis.len() - 1]);
+    let width = (last - first) / (axis.len() - 1) as f64;
+    axis.iter().enumerate().all(|(i, c)| (c - (first + i as f64 * width)).abs() <= UNEVEN * width)
+}
+
 /// The values of a field on a grid, in their own type.
 #[derive(Debug)]
 pub(crate) struct Samples {
-    values: Arc<Values>,
+    pub(super) values: Arc<Values>,
     pub(super) components: usize,
     pub(super) of_cells: bool,
-    normal: [Normal; 4],
+    pub(super) normal: [Normal; 4],
     /// Points along x, and in a layer of x and y: what corners of a voxel are apart.
-    stride: [usize; 2],
+    pub(super) stride: [usize; 2],
     /// Blocks along each axis.
     pub(super) blocks: [usize; 3],
     /// The least and the greatest value of the last component in each, normalised; the first is greater if there is none.
@@ -181,8 +194,15 @@ impl Samples {
     #[inline(always)]
     pub(super) fn corners(&self, [x, y, z]: [usize; 3], k: usize) -> [f64; 8] {
         let [row, layer] = self.stride;
+        self.corners_from(z * layer + y * row + x, k)
+    }
+
+    /// The same of the voxel whose first corner is point `p`.
+    #[inline(always)]
+    pub(super) fn corners_from(&self, p: usize, k: usize) -> [f64; 8] {
+        let [row, layer] = self.stride;
         let n = self.components;
-        let first = (z * layer + y * row + x) * n + k;
+        let first = p * n + k;
         let at = [0, n, row * n, (row + 1) * n, layer * n, (layer + 1) * n, (layer + row) * n, (layer + row + 1) * n];
         let Normal { mid, half } = self.normal[k];
         let factor = 1.0 / half;

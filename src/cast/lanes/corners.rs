@@ -1,0 +1,102 @@
+//! Values at the corners of voxels, as they are in memory: pairs along x, as the bits that lanes take them from.
+
+use super::lines::Map;
+use super::walk::LANES;
+
+/// Steps that eight rays take before what they pass is looked at.
+pub(super) const STEPS: usize = 16;
+
+/// A type of values: two of them as the bits of two f32, or, if it is an integer that f32 holds, of two i32.
+pub(super) trait Texel: Copy {
+    /// Whether the bits are integers'.
+    const INTEGER: bool = false;
+    /// Whether the bits are the values themselves, not yet mapped.
+    const PLAIN: bool = true;
+    /// The bits of one.
+    fn bits(self, map: &Map) -> u32;
+}
+
+macro_rules! texel {
+    ($($type:ty: $integer:literal, $plain:literal, $v:ident, $map:ident => $bits:expr;)*) => {
+        $(impl Texel for $type {
+            const INTEGER: bool = $integer;
+            const PLAIN: bool = $plain;
+            #[inline(always)]
+            #[allow(clippy::cast_lossless, clippy::unnecessary_cast, unused_variables, reason = "one form for ten types")]
+            fn bits(self, $map: &Map) -> u32 {
+                let $v = self;
+                $bits
+            }
+        })*
+    };
+}
+
+texel! {
+    i8: true, true, v, map => v as i32 as u32;
+    u8: true, true, v, map => v as u32;
+    i16: true, true, v, map => v as i32 as u32;
+    u16: true, true, v, map => v as u32;
+    f32: false, true, v, map => v.to_bits();
+    i32: false, false, v, map => mapped(v as f64, map);
+    u32: false, false, v, map => mapped(v as f64, map);
+    i64: false, false, v, map => mapped(v as f64, map);
+    u64: false, false, v, map => mapped(v as f64, map);
+    f64: false, false, v, map => mapped(v, map);
+}
+
+#[inline(always)]
+fn mapped(v: f64, map: &Map) -> u32 {
+    (((v - map.mid) * map.factor) as f32).to_bits()
+}
+
+/// The pairs of the voxels of a chunk's steps: by step, by row of the voxel (y fastest), by ray.
+pub(super) type Pairs = [[[u64; LANES]; 4]; STEPS];
+
+/// Fetches the values at the corners of the voxels whose first corners have these indices; `rows` are how far the four rows
+/// of a voxel are behind that. What would be beyond the array is left as it is.
+#[inline(never)]
+pub(super) fn fetch<T: Texel>(values: &[T], first: &[[u32; LANES]], rows: [usize; 4], map: &Map, pairs: &mut Pairs) {
+    // Rows of one length: so one comparison does for all four.
+    let Some(length) = values.len().checked_sub(rows[3]) else { return };
+    let row = |r: usize| values.get(rows[r]..).and_then(|row| row.get(..length));
+    let (Some(v0), Some(v1), Some(v2), Some(v3)) = (row(0), row(1), row(2), row(3)) else { return };
+    // All that is far in memory is asked for at once.
+    let mut asked = 0;
+    for first in first {
+        for at in [first[0] as usize, first[LANES - 1] as usize] {
+            if at < length {
+                asked ^= v0[at].bits(map) ^ v1[at].bits(map) ^ v2[at].bits(map) ^ v3[at].bits(map);
+            }
+        }
+    }
+    std::hint::black_box(asked);
+    for (first, [p0, p1, p2, p3]) in first.iter().zip(pairs) {
+        for l in 0..LANES {
+            let at = first[l] as usize;
+            let ends = at..at + 2;
+            let (a, b, c, d) = (v0.get(ends.clone()), v1.get(ends.clone()), v2.get(ends.clone()), v3.get(ends));
+            if let (Some([a, i]), Some([b, j]), Some([c, k]), Some([d, m])) = (a, b, c, d) {
+                (p0[l], p1[l], p2[l], p3[l]) =
+                    (pair(*a, *i, map), pair(*b, *j, map), pair(*c, *k, map), pair(*d, *m, map));
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn pair<T: Texel>(a: T, b: T, map: &Map) -> u64 {
+    u64::from(a.bits(map)) | u64::from(b.bits(map)) << 32
+}
+
+/// The same of values in voxels: all corners have the voxel's.
+#[inline(never)]
+pub(super) fn fetch_cells<T: Texel>(values: &[T], first: &[[u32; LANES]], map: &Map, pairs: &mut Pairs) {
+    for (first, pairs) in first.iter().zip(pairs) {
+        for l in 0..LANES {
+            let bits = values.get(first[l] as usize).map_or(0, |v| u64::from(v.bits(map)));
+            for row in &mut *pairs {
+                row[l] = bits | bits << 32;
+            }
+        }
+    }
+}
