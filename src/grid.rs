@@ -61,15 +61,17 @@ impl Grid {
     ///
     /// # Errors
     /// [`Error::Mesh`] if a number is not finite, two points would share a place, directions are linearly dependent, or
-    /// an array's length is not components × points (or cells).
+    /// an array's length is not components × points (or cells); [`Error::NoMemory`].
     pub fn regular(lattice: &Lattice, point_arrays: Vec<Array>, cell_arrays: Vec<Array>) -> Result<Self> {
         let Lattice { origin, spacing, direction, first, size } = *lattice;
         // Where axes are not turned the origin belongs to the coordinates, so that these are as VTK computes them.
         let straight = direction == DMat3::IDENTITY;
-        let axes = [0, 1, 2].map(|a| {
+        let mut axes = [const { Vec::new() }; 3];
+        for (a, axis) in axes.iter_mut().enumerate() {
             let start = if straight { origin[a] } else { 0.0 };
-            (0..size[a]).map(|i| start + spacing[a] * (first[a] + i as i64) as f64).collect()
-        });
+            memory::reserve(format!("the {} points along an axis of a grid", size[a]), axis, size[a])?;
+            axis.extend((0..size[a]).map(|i| start + spacing[a] * first[a].saturating_add(i as i64) as f64));
+        }
         let origin = if straight { DVec3::ZERO } else { origin };
         Self::new(axes, origin, direction, true, [point_arrays, cell_arrays])
     }

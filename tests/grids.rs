@@ -375,6 +375,21 @@ fn steps_are_lengths() {
     }
 }
 
+/// What is too large to be held is refused, by an error of its own kind.
+#[test]
+fn grids_that_no_memory_holds_are_errors() {
+    for size in [[1 << 60, 1, 1], [1, 1 << 60, 2], [2, 1, usize::MAX]] {
+        let lattice = Lattice { size, first: [i64::MAX - 1; 3], ..Lattice::default() };
+        let error = Grid::regular(&lattice, vec![], vec![]).unwrap_err();
+        assert!(matches!(error, halite::Error::NoMemory(_)), "{size:?}: {error}");
+        assert!(error.to_string().contains("points along an axis"), "{error}");
+    }
+    // Indices beyond all numbers are one place.
+    let lattice = Lattice { size: [4, 2, 2], first: [i64::MAX - 1; 3], ..Lattice::default() };
+    let error = Grid::regular(&lattice, vec![], vec![]).unwrap_err();
+    assert!(error.to_string().contains("do not ascend"), "{error}");
+}
+
 /// The scenes of grids that are drawn today: those with light need a function of two variables.
 #[test]
 fn the_oracle_drew_the_same() {

@@ -154,6 +154,36 @@ fn all_time_steps_of_nothing() {
     assert!(told.contains("time steps\n             0  2.5  described here\n"), "{told}");
 }
 
+/// A step whose file is missing is left out, and keeps its number; without any there is nothing to draw.
+#[test]
+fn steps_that_are_missing() {
+    let place = TempDir::new().unwrap();
+    let folder = place.path();
+    for (name, by) in [("0.vtu", 1.0), ("2.vtu", 3.0)] {
+        std::fs::write(folder.join(name), cube(by, "0")).unwrap();
+    }
+    let list = |names: [&str; 3]| {
+        let entry = |(step, name): (usize, &&str)| format!("<DataSet timestep='{step}' file='{name}'/>");
+        let entries = names.iter().enumerate().map(entry).collect::<String>();
+        std::fs::write(
+            folder.join("a.pvd"),
+            format!("<VTKFile type='Collection'><Collection>{entries}</Collection></VTKFile>"),
+        )
+        .unwrap();
+    };
+    list(["0.vtu", "1.vtu", "2.vtu"]);
+    let (code, _, err) = run(folder, "render a.pvd --out x.npy --size 16x12 --all-times", b"");
+    assert!(code == Some(0) && err.contains("a.pvd: time step 1 is left out") && err.contains("1.vtu"), "{err}");
+    assert!(folder.join("x_0000.npy").exists() && !folder.join("x_0001.npy").exists());
+    let last = Image::open(&folder.join("x_0002.npy")).unwrap();
+    assert!(last.pixels.iter().any(|p| p[3] > 0.2) && last.size == [16, 12]);
+    let (code, _, err) = run(folder, "render a.pvd --out y.npy --size 16x12 --time 1", b"");
+    assert!(code == Some(1) && err.contains("1.vtu"), "what is asked for must be there: {err}");
+    list(["1.vtu", "3.vtu", "4.vtu"]);
+    let (code, _, err) = run(folder, "render a.pvd --out z.npy --size 16x12 --all-times", b"");
+    assert!(code == Some(1) && err.lines().last().is_some_and(|line| line.starts_with("halite: ")), "{err}");
+}
+
 #[test]
 fn standard_input_and_output() {
     let place = TempDir::new().unwrap();

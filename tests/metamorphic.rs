@@ -221,3 +221,30 @@ fn in_units(scene: &Scene, unit: impl Fn(f64) -> f64, falling: bool) -> Scene {
     let array = Array { values, ..array.clone() };
     Scene::new(&scene.mesh, array, scene.field.association(), |_| transfer)
 }
+
+/// Colours in bytes are 255ths, whichever engine draws them and however they are blended.
+#[test]
+fn colors_in_bytes_are_shares_of_255() {
+    let mesh = halite::mesh::generate::tetrahedra(3);
+    let mut random = Random::of("bytes");
+    let bytes: Vec<u8> = (0..4 * mesh.points().len()).map(|_| random.below(256) as u8).collect();
+    let share = |(i, b): (usize, &u8)| if i % 4 == 3 { f64::from(*b) } else { f64::from(*b) / 255.0 };
+    let shares = Values::F64(bytes.iter().enumerate().map(share).collect());
+    let opacity = vec![(0.0, 0.0), (60.0, 0.1), (180.0, 0.9), (255.0, 0.4)];
+    let scene = |values| {
+        let array = Array { name: "rgba".into(), components: 4, values };
+        let transfer = TransferFunction::new(vec![(0.0, [1.0; 3])], opacity.clone(), 0.6).unwrap();
+        Scene::new(&mesh, array, Association::Point, |_| transfer.clone())
+    };
+    let [as_bytes, as_shares] = [scene(Values::U8(bytes)), scene(shares)];
+    let view = camera(dvec3(1.0, 2.0, 3.0), DVec3::ZERO, DVec3::Y, Projection::Perspective { view_angle: 40.0 });
+    let views = [view.clone(), view.with_blend(Blend::Maximum)];
+    for engine in ENGINES {
+        let drawn = engine.draw(&as_shares, &views);
+        let dim = |p: &[f32; 4]| p[3] > 0.3 && p[..3].iter().all(|c| *c < 0.8 * p[3]);
+        assert!(drawn.iter().all(|image| image.pixels.iter().any(dim)), "{engine:?}: some colours are not full");
+    }
+    let mut report = Report::default();
+    hold(&mut report, "bytes", [(&as_shares, &views), (&as_bytes, &views)], BOUND);
+    report.finish("bytes");
+}

@@ -28,6 +28,8 @@ use std::path::Path;
 
 const TWIN: Engine = Engine::Twin { threads: 2 };
 
+const SWEEP: Engine = Engine::Sweep { threads: 2 };
+
 /// Of any channel of any pixel.
 const BOUND: f64 = 2e-5;
 
@@ -273,8 +275,11 @@ fn a_tiny_unit_distance_is_opaque() {
                     DVec3::Y,
                     Projection::Parallel { parallel_scale: 1.3 },
                 );
-                let mut images =
-                    vec![("reference", Engine::Reference.image(&scene, &view)), ("twin", TWIN.image(&scene, &view))];
+                let mut images = vec![
+                    ("reference", Engine::Reference.image(&scene, &view)),
+                    ("twin", TWIN.image(&scene, &view)),
+                    ("sweep", SWEEP.image(&scene, &view)),
+                ];
                 for (name, renderer) in [("device", &mut device), ("projected", &mut projected)] {
                     if let Some(renderer) = renderer {
                         set(renderer, &scene);
@@ -324,6 +329,7 @@ fn very_flat_meshes_are_drawn() {
         // The reference moves rays that lie in a face aside by 1e-11, which is much of a needle's width.
         let bound = if k == 1 { 2e-3 } else { BOUND };
         report.hold(&format!("twin, {k}"), &TWIN.image(&scene, &view), &expected, bound);
+        report.hold(&format!("sweep, {k}"), &SWEEP.image(&scene, &view), &expected, bound);
         for renderer in devices.iter_mut().flatten() {
             set(renderer, &scene);
             let got = renderer.render(&view, &|_| ()).unwrap();

@@ -387,7 +387,14 @@ impl Contents<'_> {
             let path = self.store.input.path.display();
             tracing::warn!("{path}: {} has {stated} bytes; only {total} of them are needed and read", self.array);
         } else if !spare && stated != total {
-            return Err(format!("it holds {stated} bytes, but its numbers need {total}").into());
+            let hint = match stated {
+                _ if (stated as u32).swap_bytes() as u64 == total || stated.swap_bytes() == total => {
+                    "; the file's byte_order seems to be wrong"
+                }
+                _ if stated & u64::from(u32::MAX) == total => "; the file's header_type seems to be wrong",
+                _ => "",
+            };
+            return Err(format!("it holds {stated} bytes, but its numbers need {total}{hint}").into());
         }
         if blocks.packed.is_none() && total > blocks.body.length() {
             return Err(format!("the file ends after {} of its {total} bytes", blocks.body.length()).into());

@@ -154,10 +154,21 @@ impl Parts {
         if !from.pass("OFFSETS") {
             from.enter_numbers();
             let list = from.numbers::<i32>(size)?;
+            if count > size {
+                return Err(format!("it says {count} cells, and lists {size} numbers"));
+            }
             // What is negative is out of range in any case.
             from.had(memory::check_array::<u32>("its cells", 2 * size + 2 * count))?;
             let list: Vec<u32> = list.into_iter().map(|n| u32::try_from(n).unwrap_or(u32::MAX)).collect();
-            return self.unpack(&list, count);
+            return self.unpack(&list, count).map_err(|what| {
+                let turned = list.first().is_some_and(|n| (n.swap_bytes() as usize) < size.min(1 << 16));
+                let hint = if from.binary && turned {
+                    "; the lowest byte seems to be first, where VTK's files have the highest"
+                } else {
+                    ""
+                };
+                what + hint
+            });
         }
         let list = |from: &mut Scanner<'_>, count| -> Result<Values, Fault> {
             let kind = Type::from_name(&from.word("the type of the list")?, from.binary)?;

@@ -4,6 +4,7 @@ use super::input::{Input, Place, find};
 use super::{DataSet, Source, join, validated};
 use crate::error::{Error, Result};
 use serde::Deserialize;
+use serde_json::error::Category;
 use std::path::{Path, PathBuf};
 
 /// A list of files (`.pvd`, `.series`), by time.
@@ -52,7 +53,12 @@ impl Series {
     pub(super) fn parse(input: &Input) -> Result<Self> {
         let path = &input.path;
         let text = input.bytes().map_err(|e| Error::file(path, e))?;
-        let listed: Listed = serde_json::from_slice(&text).map_err(|e| Error::malformed(path, e.to_string()))?;
+        let broken = |e: serde_json::Error| match e.classify() {
+            Category::Data => "it holds no list \"files\", of objects with a \"name\" and a \"time\"".to_owned(),
+            _ => format!("it is no JSON: line {}, column {}", e.line(), e.column()),
+        };
+        let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&text);
+        let listed: Listed = serde_json::from_slice(text).map_err(|e| Error::malformed(path, broken(e)))?;
         Self::new(path, listed.files.into_iter().map(|file| (file.time, file.name)).collect())
     }
 

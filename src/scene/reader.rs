@@ -49,6 +49,10 @@ fn at_place(error: &serde_json::Error) -> String {
         "invalid number" => "this is no number",
         "recursion limit exceeded" => "there are too many lists and objects in each other",
         "invalid unicode code point" => "this is not UTF-8",
+        "invalid escape" => "this is no escape of a character in a text",
+        "lone leading surrogate in hex escape" | "unexpected end of hex escape" => {
+            "this is half of a character that is escaped in two parts"
+        }
         "control character (\\u0000-\\u001F) found while parsing a string" => "a text goes on beyond its line",
         _ if error.classify() == Category::Eof => "the file ends before the scene does",
         other => other,

@@ -92,6 +92,16 @@ fn lies_about_sizes() {
     assert!(first(2, 39).contains("it holds 39 bytes"));
     assert!(first(3, 1 << 62).contains("the file ends after"));
     assert!(first(3, 3).contains("block 0 is not valid zlib"));
+    // Of what the head says of all arrays' headers.
+    let text = String::from_utf8(write(Style { mode: Mode::Inline, ..PLAIN }, &[piece()])).unwrap();
+    let what = malformed(text.replace("LittleEndian", "BigEndian").as_bytes());
+    assert!(what.contains("the file's byte_order seems to be wrong"), "{what}");
+    let mut moved = piece();
+    let Values::F64(points) = &mut moved.points else { panic!("points are f64") };
+    points[0] = 0.25;
+    let moved = String::from_utf8(write(Style { mode: Mode::Inline, ..PLAIN }, &[moved])).unwrap();
+    let what = malformed(moved.replace("UInt32", "UInt64").as_bytes());
+    assert!(what.contains("the file's header_type seems to be wrong"), "{what}");
     let text = String::from_utf8(write(Style { mode: Mode::AppendedBase64, ..PLAIN }, &[piece()])).unwrap();
     let far = text.replace("offset=\"60\"", "offset=\"99999999\"");
     let mesh = read(far.as_bytes()).unwrap();

@@ -95,6 +95,11 @@ fn binary_legacy_files() {
     assert_eq!(us.values, Values::U16(vec![1, 65535, 3, 10]));
     assert_eq!(g.values, Values::I64(vec![0x0a0a_2020, 1, 2, 0x2020_0a0a]));
     assert_eq!((&b.values, &u.values), (&Values::U8(vec![1, 0, 1, 1]), &Values::U8(b"\n\n  ".to_vec())));
+    let at = file.windows(6).position(|w| w == b"CELLS ").unwrap() + "CELLS 1 5\n".len();
+    let mut turned = file.clone();
+    turned[at..at + 20].chunks_exact_mut(4).for_each(<[u8]>::reverse);
+    let error = read_as("mesh.vtk", &turned).unwrap_err().to_string();
+    assert!(error.contains("the lowest byte seems to be first"), "{error}");
     for cut in 1..file.len() {
         // Whatever is missing, it is an error, or all of the arrays that are there.
         let _ = read_as("mesh.vtk", &file[..cut]);
@@ -113,6 +118,8 @@ fn damaged_legacy_files() {
     told("CELLS 2 10", "CELLS 3 10", "it says 3 cells, and its 10 numbers are 2");
     told("CELLS 2 10", "CELLS 2 11", "CELLS, at byte 110: it holds 10 numbers, not 11: CELL_TYPES follows");
     told("CELLS 2 10", "CELLS 2 9", "cell 1 has more points");
+    told("CELLS 2 10", "CELLS 18446744073709551615 10", "it says 18446744073709551615 cells, and lists 10 numbers");
+    told("CELL_TYPES 2\n", "CELL_TYPES 18446744073709551615\n", "it holds 2 numbers, not 18446744073709551615");
     told("CELL_TYPES 2\n10 10\n", "CELL_TYPES 1\n10\n", "CELL_TYPES has 1 types where there are 2 CELLS");
     told("CELL_TYPES 2\n10 10\n", "CELL_TYPES 2\n10 10 10\n", "it holds more numbers than it says");
     told("POINTS 5", "POINTS 4000000000", "POINTS, at byte 65: it holds 15 numbers, not 12000000000: CELLS follows");

@@ -117,6 +117,22 @@ fn collections() {
     assert_eq!((source.times(), values(&source.read(1, &|_| ()).unwrap(), "T")), (&[0.5, 2.0][..], Some(6.0)));
 }
 
+/// What is wrong with a list is said in its own words.
+#[test]
+fn broken_series() {
+    for (text, part) in [
+        ("{\"files\": [", "it is no JSON: line 1, column 11"),
+        ("{\n\"files\": [}", "it is no JSON: line 2, column 11"),
+        ("{\"file\": []}", "it holds no list \"files\""),
+        ("{\"files\": [{\"time\": 1}]}", "it holds no list \"files\""),
+        ("{\"files\": [{\"name\": \"a.vtu\", \"time\": \"soon\"}]}", "objects with a \"name\" and a \"time\""),
+        ("{\"files\": []}", "it lists no file"),
+    ] {
+        let error = listed("a.vtu.series", text, &[]).1.err().unwrap().to_string();
+        assert!(error.contains(part) && error.contains("a.vtu.series") && !error.contains("expected"), "{error}");
+    }
+}
+
 /// Parts with and without polyhedra.
 #[test]
 fn polyhedra_of_several_files() {

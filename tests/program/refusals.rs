@@ -30,11 +30,33 @@ fn minus_one_is_a_number() {
         assert!(err.contains("'-1'") && err.contains(option), "{option}: {err}");
         assert!(!err.contains("invalid digit") && !err.contains("expected one of"), "{option}: {err}");
     }
+    // Nor are lists that start with it taken for options.
+    for (option, part) in [
+        ("--size -1x5", "width x height"),
+        ("--background -1,0,0", "red, green and blue are 0 to 1"),
+        ("--nan-color -1,0,0", "red, green and blue are 0 to 1"),
+        ("--scale -1,1,1", "above 0"),
+        ("--scale 1,1,1e40", "1e-30 to 1e30"),
+        ("--shade=-1,1,1,1", "0 or more"),
+        ("--threads 100000", "4096 threads at most"),
+    ] {
+        place.misused(&format!("render cube.vtu --out x.png {option}"), part);
+    }
     place.misused("bench cube.vtu --frames -1", "1..=10000");
     place.misused("render cube.vtu --out x.png --scale 1,0,1", "above 0");
     place.misused("render cube.vtu --out x.png --rgba v --scalars s", "--scalars");
     place.misused("render cube.vtu --out x.png --pair v --rgba v", "--rgba");
     place.misused("render cube.vtu --out x.npy --legend", "--legend");
+    // A grid without cells is no mesh, and there is nothing to draw of it.
+    let empty = "<VTKFile type='ImageData'><ImageData WholeExtent='0 -1 0 -1 0 -1'>\
+        <Piece Extent='0 -1 0 -1 0 -1'/></ImageData></VTKFile>";
+    place.write("empty.vti", empty);
+    for options in ["", "--reconstruction 1"] {
+        let Ran(code, _, err) = place.run(&format!("render empty.vti --out x.png {options}"));
+        assert!(code == Some(1) && err.contains("empty.vti") && err.contains("cell"), "{options}: {err}");
+        assert!(!err.contains("this is a mesh"), "{options}: {err}");
+    }
+    place.fails("render cube.vtu --out x.png --reconstruction 1", &["cube.vtu", "this is a mesh"]);
 }
 
 /// What scenes have wrong is said by key, or by line and column, and never in the words of the program's own types.
@@ -62,6 +84,8 @@ fn scenes_are_spoken_of() {
             vec!["blend: \"add\" is not known here; there is composite, maximum"],
         ),
         ("\"size\": [12, 8]", "\"size\": [12, 8,]", vec!["line 4, column", "\",\" with nothing after it"]),
+        ("\"name\": \"s\"", "\"name\": \"\\q\"", vec!["line 1, column", "this is no escape"]),
+        ("\"name\": \"s\"", "\"name\": \"\\ud800\"", vec!["line 1, column", "half of a character"]),
         ("\"size\": [12, 8]", "\"size\": 12", vec!["size: a list of 2 is meant, and not 12"]),
         ("\"name\": \"s\"", "\"name\": \"\"", vec!["scalars.name: the name is empty"]),
         ("[0, 1, 0, 0]", "[0, 255, 0, 0]", vec!["color[0]: red, green and blue are 0 to 1, and one is 255"]),
@@ -103,6 +127,29 @@ fn memory_runs_out_with_a_word() {
     assert!(code == Some(1) && err.starts_with("halite: ") && err.lines().count() == 1, "{code:?}: {err}");
     assert!(err.contains("16384x16384") && err.contains("memory") && err.contains("GB"), "{err}");
     assert!(!place.path("x.png").exists());
+    // Grids whose extents nobody can hold.
+    let extent = "-2147483648 2147483647 0 0 0 0";
+    let grid = |kind: &str, inner: &str| {
+        format!(
+            "<VTKFile type='{kind}'><{kind} WholeExtent='{extent}'><Piece Extent='{extent}'>{inner}</Piece></{kind}></VTKFile>"
+        )
+    };
+    let axis = |numbers: &str| format!("<DataArray type='Float64' format='ascii'>{numbers}</DataArray>");
+    place.write("long.vti", &grid("ImageData", ""));
+    place.write("long.vtr", &grid("RectilinearGrid", &format!("<Coordinates>{}</Coordinates>", axis("0 1").repeat(3))));
+    place.write("long.vts", &grid("StructuredGrid", &format!("<Points>{}</Points>", axis("0 1 2"))));
+    let dimensions = "DATASET STRUCTURED_POINTS\nDIMENSIONS 4294967296 1 1\n";
+    place.write("long.vtk", &format!("# vtk DataFile Version 3.0\nlong\nASCII\n{dimensions}"));
+    for (file, part) in [
+        ("long.vti", "not enough memory for the 4294967296 points"),
+        ("long.vtr", "2 numbers, not 4294967296"),
+        ("long.vts", "long.vts: "),
+        ("long.vtk", "not enough memory for the 4294967296 points"),
+    ] {
+        let (code, err) = limited(4_000_000, &format!("info {file}"));
+        assert!(code == Some(1) && err.starts_with("halite: ") && err.lines().count() == 1, "{code:?}: {err}");
+        assert!(err.contains(part), "{err}");
+    }
     let (code, err) = limited(4_000_000, "render cube.vtu --out x.png --device cpu --size 64x48");
     assert_eq!((code, err.as_str()), (Some(0), ""));
     // Whatever there is too little of: a picture, or one line.

@@ -34,7 +34,7 @@ struct Cli {
     #[command(subcommand)]
     command: Command,
     /// Threads to work with; 0 is one for each core
-    #[arg(long, global = true, value_name = "N", default_value_t = 0, value_parser = parse::count)]
+    #[arg(long, global = true, value_name = "N", default_value_t = 0, value_parser = parse::threads)]
     threads: usize,
     /// Say on stderr what is chosen and left out
     #[arg(short, long, global = true)]

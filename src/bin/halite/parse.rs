@@ -25,12 +25,27 @@ pub(crate) fn vector(text: &str) -> Result<DVec3, String> {
 /// `X,Y,Z`, all above 0
 pub(crate) fn factors(text: &str) -> Result<DVec3, String> {
     let factors = vector(text)?;
-    if factors.cmpgt(DVec3::ZERO).all() { Ok(factors) } else { Err("all three factors are above 0".into()) }
+    if factors.cmple(DVec3::ZERO).any() {
+        return Err("all three factors are above 0".into());
+    }
+    if factors.cmplt(DVec3::splat(1e-30)).any() || factors.cmpgt(DVec3::splat(1e30)).any() {
+        return Err("all three factors are 1e-30 to 1e30".into());
+    }
+    Ok(factors)
 }
 
 /// A whole number from 0.
 pub(crate) fn count(text: &str) -> Result<usize, String> {
     text.trim().parse().map_err(|_| "it is a whole number from 0".into())
+}
+
+/// Threads that one machine may have; more take minutes to start, and gain nothing.
+const MOST_THREADS: usize = 4096;
+
+/// A number of threads, 0 for one for each core.
+pub(crate) fn threads(text: &str) -> Result<usize, String> {
+    let threads = count(text)?;
+    if threads <= MOST_THREADS { Ok(threads) } else { Err(format!("there are {MOST_THREADS} threads at most")) }
 }
 
 /// A text that is not empty.

@@ -55,7 +55,7 @@ pub(crate) struct Request {
     #[arg(long, value_name = "STEP|TIME", value_parser = parse::time, allow_hyphen_values = true)]
     time: Option<Time>,
     /// Width and height in pixels [default: the scene's, or 1024x768]
-    #[arg(long, value_name = "WxH", value_parser = parse::size)]
+    #[arg(long, value_name = "WxH", value_parser = parse::size, allow_hyphen_values = true)]
     pub(crate) size: Option<[u32; 2]>,
     /// What stands for the field of a regular or rectilinear grid between samples: itself, parabolas, lines, or rectangles
     /// by the middle, the left or the right sample [default: exact]
@@ -68,7 +68,7 @@ pub(crate) struct Request {
     #[arg(long, value_name = "X,Y,Z", value_parser = parse::factors, allow_hyphen_values = true)]
     scale: Option<DVec3>,
     /// What a .png shows behind the volume: R,G,B in 0 to 1, "black", "white", or "none" for transparency
-    #[arg(long, value_name = "COLOR", value_parser = parse::background)]
+    #[arg(long, value_name = "COLOR", value_parser = parse::background, allow_hyphen_values = true)]
     background: Option<parse::Background>,
 
     /// The array to draw [default: the first useful one]
@@ -103,7 +103,8 @@ pub(crate) struct Request {
     #[arg(long, value_name = "S:A,...", value_parser = parse::opacity, allow_hyphen_values = true, help_heading = "Look")]
     pub(crate) opacity: Option<automatic::Opacity>,
     /// Draw where values are missing (NaN, infinite) in a colour; an opacity may follow [default: nothing is drawn there]
-    #[arg(long, value_name = "R,G,B[,A]", value_parser = parse::color_and_opacity, help_heading = "Look")]
+    #[arg(long, value_name = "R,G,B[,A]", value_parser = parse::color_and_opacity, allow_hyphen_values = true,
+        help_heading = "Look")]
     nan_color: Option<([f64; 3], Option<f64>)>,
     /// The length that opacities are meant for, in world units
     #[arg(long, value_name = "LENGTH", value_parser = parse::positive, help_heading = "Look")]
@@ -211,7 +212,7 @@ pub(crate) fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut 
     let path = given.as_ref().map_or(options.input.clone(), |scene| scene.mesh.clone());
     let of_two = given.as_ref().is_some_and(|scene| !scene.transfer.is_of_one_variable()) || options.second.is_given();
     let (mut mesh, mut grid) = input::mesh(&path, steps.time, of_two)?;
-    if grid.is_none() && options.reconstruction.is_some() {
+    if grid.is_none() && options.reconstruction.is_some() && !mesh.cells().is_empty() {
         bail!("{}: --reconstruction is for regular and rectilinear grids, and this is a mesh", path.display());
     }
     if let Some(by) = options.scale {

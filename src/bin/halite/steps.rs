@@ -31,20 +31,38 @@ pub(crate) fn draw(options: &Options, given: Option<Scene>, renderer: &mut Rende
     if given.is_none() && request.range.is_none() {
         steps.values = renderer.install(|| range_of_all(request, count))?;
     }
-    let mut reports = vec![];
+    let (mut reports, mut missing) = (vec![], None);
     for step in 0..count {
         steps.time = Some(Time::Step(step));
-        let job = renderer.install(|| prepare_step(request, given.clone(), &mut steps))?;
+        let job = match renderer.install(|| prepare_step(request, given.clone(), &mut steps)) {
+            Err(error) if is_missing(&error, count) => {
+                tracing::warn!("{}: time step {step} is left out: {error:#}", path.display());
+                missing = Some(error);
+                continue;
+            }
+            job => job?,
+        };
         reports.push(picture(options, &output::numbered(&options.out, step, count), job, renderer)?);
     }
-    Ok(reports.into())
+    match missing {
+        Some(error) if reports.is_empty() => Err(error),
+        _ => Ok(reports.into()),
+    }
+}
+
+/// Whether that is wrong with one of several steps which others can do without: its file cannot be opened.
+fn is_missing(error: &anyhow::Error, count: usize) -> bool {
+    count > 1 && matches!(error.downcast_ref(), Some(halite::Error::File { .. }))
 }
 
 /// The range that the values of all time steps have where they are drawn.
 fn range_of_all(request: &Request, count: usize) -> Result<Option<[f64; 2]>> {
     let (mut all, mut scalars) = (None::<[f64; 2]>, None);
     for step in 0..count {
-        let (mesh, _) = input::mesh(&request.input, Some(Time::Step(step)), false)?;
+        let (mesh, _) = match input::mesh(&request.input, Some(Time::Step(step)), false) {
+            Err(error) if is_missing(&error, count) => continue,
+            read => read?,
+        };
         if request.has_no_choice(&mesh) {
             return Ok(None);
         }

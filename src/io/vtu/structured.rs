@@ -7,6 +7,7 @@ use crate::error::Result;
 use crate::grid::{self, Lattice};
 use crate::io::blocks::{Block, Of, duplicates, gather, hide_missing};
 use crate::io::{DataSet, validated};
+use crate::memory;
 use crate::mesh::Mesh;
 use glam::DVec3;
 
@@ -50,11 +51,15 @@ impl Grid<'_> {
 
     /// The coordinates along each axis of a rectilinear grid.
     fn axes(&self, whole: &Block) -> Result<[Vec<f64>; 3]> {
-        let mut axes = whole.size.map(|n| vec![f64::NAN; if n < 1 << 32 { n as usize } else { 0 }]);
+        let mut axes = [const { Vec::new() }; 3];
         for (i, piece) in self.pieces.iter().enumerate() {
             let Some(block) = piece.block.filter(|_| piece.points > 0) else { continue };
             for (a, axis) in axes.iter_mut().enumerate() {
                 let own = self.axis(i, piece, a, block.size[a])?;
+                // Only now is it sure that the file holds what it announces.
+                if axis.is_empty() {
+                    *axis = memory::filled("the coordinates of a grid", f64::NAN, whole.size[a] as usize)?;
+                }
                 let start = (block.low[a] - whole.low[a]) as usize;
                 for (known, c) in axis[start..].iter_mut().zip(own) {
                     // Pieces may round them apart.
