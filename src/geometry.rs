@@ -19,6 +19,9 @@ use rayon::prelude::*;
 /// Meshes that are less thick than this, of what they are wide, are too flat for f32.
 const FLATTEST: f64 = 5e-5;
 
+/// A cell that is less thick than this, of its longest edge, is flat.
+const FLAT_CELL: f64 = 2e-3;
+
 /// One tetrahedron as engines see it: 32 bytes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, bytemuck::Pod, Zeroable)]
 #[repr(C)]
@@ -172,6 +175,21 @@ impl Geometry {
             pairs.iter().map(|&(i, j)| p[i].distance_squared(p[j])).fold(0.0, f64::max)
         };
         self.cells.par_iter().map(edges).reduce(|| f64::MIN_POSITIVE, f64::max).sqrt()
+    }
+
+    /// The longest edge of the cells that are flat, in normalised units; 0 if none is. Lengths across such a cell are
+    /// differences of what is as long as it is wide.
+    pub fn longest_flat_edge(&self) -> f64 {
+        let edge = |c: &Cell| {
+            let p = c.corners.map(|i| self.points[i as usize]);
+            let [a, b, c] = [p[1] - p[0], p[2] - p[0], p[3] - p[0]];
+            let normals = [(c - a).cross(b - a), b.cross(c), c.cross(a), a.cross(b)];
+            let area = normals.iter().map(|n| n.length_squared()).fold(0.0, f64::max).sqrt();
+            let longest = [a, b, c, b - a, c - a, c - b].iter().map(|e| e.length_squared()).fold(0.0, f64::max).sqrt();
+            let volume = a.dot(b.cross(c)).abs();
+            if volume > 0.0 && volume < FLAT_CELL * longest * area { longest } else { 0.0 }
+        };
+        self.cells.par_iter().map(edge).reduce(|| 0.0, f64::max)
     }
 
     /// Bytes that it takes at most to make one of so many points and tetrahedra, with what [`Faces::new`] needs and leaves.

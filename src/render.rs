@@ -10,6 +10,7 @@ mod recover;
 mod second;
 mod stats;
 mod tables;
+mod thickness;
 
 use crate::cast::Reconstruction;
 pub use crate::engine::Engine;
@@ -147,7 +148,10 @@ impl Renderer {
         let walks = left || second;
         self.stats.engine = if walks { Backend::Walk.engine() } else { self.backend.engine() }.into();
         if left && self.backend.gpu().is_some() && self.stats.device != "cpu" {
-            tracing::warn!("the mesh is too flat for the 32-bit floats of a device; the CPU draws it, by the walk");
+            tracing::warn!(
+                "the mesh, or a cell of it where the function is dense, is too flat for the 32-bit floats of a device; \
+                 the CPU draws it, by the walk"
+            );
         }
         // Nobody who left the choice to Halite on a CPU asked for another engine.
         let chosen = self.engine != Engine::Auto || self.backend.gpu().is_some();
@@ -254,8 +258,8 @@ impl Renderer {
         }
         self.pool.install(|| mesh.geometry.set_points(&moved));
         let scaled = mesh.geometry.scale != scale;
-        (mesh.longest, self.key) = (None, None);
-        mesh.left_to_walk = !self.backend.needs().are_met_by(&mesh.geometry);
+        self.key = None;
+        mesh.judge_again(self.backend.needs());
         if mesh.left_to_walk && !mesh.connected {
             return self.connect(points);
         }
@@ -367,6 +371,7 @@ impl Renderer {
             return self.render_second(view, progress);
         }
         let start = Instant::now();
+        self.judge_thickness()?;
         let walks = self.mesh.as_ref().is_some_and(|m| m.left_to_walk);
         let on_device =
             !walks && !self.host_builds && self.backend.gpu().is_some_and(|gpu| builds(gpu, &self.integral));

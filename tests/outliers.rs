@@ -355,6 +355,42 @@ fn very_flat_meshes_are_drawn() {
     report.finish("flat meshes");
 }
 
+/// A layer of flat cells in a thick mesh: under a function that shows little else, and under one that lengths are good for.
+#[test]
+fn flat_cells_in_a_thick_mesh_are_drawn() {
+    let turn = DMat3::from_axis_angle(dvec3(0.3, -0.5, 0.8).normalize(), 0.7);
+    let mut report = Report::default();
+    let mut devices = [render::Engine::Traverse, render::Engine::Project].map(common::on_device);
+    let lattice = generate::tetrahedra(3);
+    for height in [1e-3, 1e-5, 1e-6, 1e-7] {
+        // Of four layers of points the inner two come together.
+        let squeezed = |z: f64| if z.abs() > 0.5 { z } else { height * f64::from(z > 0.0) };
+        let mesh = draw::moved(&lattice, |p| turn * dvec3(p.x, p.y, squeezed(p.z)));
+        let values: Vec<f64> = lattice.points().iter().map(|p| f64::from(p.z > 0.0)).collect();
+        for (name, unit, direct) in [("dense", 0.4 * height, false), ("lit", 1.0, true), ("mild", 0.5, false)] {
+            let opacity = vec![(0.0, 0.0), (0.2, 1.0), (0.8, 0.5), (1.0, 0.0)];
+            let transfer = TransferFunction::new(vec![(0.0, [0.3, 0.6, 0.9])], opacity, unit).unwrap();
+            let emission = if direct { Emission::Direct { scale: 0.5 / height } } else { Emission::Chromatic };
+            let scene = scene_of(&mesh, values.clone(), Association::Point, transfer.with_emission(emission).unwrap());
+            let view = view(Blend::Composite);
+            let expected = Engine::Reference.image(&scene, &view);
+            let seen = expected.pixels.iter().filter(|p| p[0] > 0.1).count();
+            assert!(name == "mild" || seen > 100, "{name}, {height:e}: {seen} pixels");
+            for engine in [TWIN, SWEEP] {
+                report.hold(&format!("{engine:?}, {name}, {height:e}"), &engine.image(&scene, &view), &expected, 1e-4);
+            }
+            for renderer in devices.iter_mut().flatten() {
+                set(renderer, &scene);
+                let got = renderer.render(&view, &|_| ()).unwrap();
+                let engine = renderer.stats().engine.clone();
+                report.hold(&format!("device, {engine}, {name}, {height:e}"), &got, &expected, 2e-4);
+                assert!(name != "mild" || renderer.stats().device == "gpu", "{engine} draws what it can");
+            }
+        }
+    }
+    report.finish("flat cells");
+}
+
 /// Cases of the same kinds that users met, as far as they are at hand.
 #[test]
 fn what_users_met_is_right() {

@@ -10,6 +10,7 @@ use crate::integral::{Exact, Integral, Lookup};
 use crate::project::cpu::{self as sweep, Sweep};
 use crate::project::{self, Switches, gpu::Project};
 use crate::render::Engine;
+use crate::transfer::{Emission, TransferFunction};
 use crate::traverse::cpu;
 use crate::traverse::gpu::Traverse;
 use crate::view::Blend;
@@ -36,12 +37,28 @@ pub(super) struct Needs {
     pub(super) neighbours: bool,
     /// Its lengths are of 32 bits, which do not tell those across a flat mesh: see [`Geometry::is_flat`].
     thickness: bool,
+    /// Its lengths across a flat cell are off by [`COARSE`] of the cell's longest edge.
+    cells: bool,
 }
+
+/// What lengths across flat cells are off by, of their longest edge, where only f32 tells them.
+const COARSE: f64 = 6e-7;
+
+/// How far off opacities may be.
+const FAINT: f64 = 1e-4;
 
 impl Needs {
     /// Whether the backend can draw the mesh.
     pub(super) fn are_met_by(self, geometry: &Geometry) -> bool {
         !self.thickness || !geometry.is_flat()
+    }
+
+    /// Whether what the lengths across flat cells are off by shows under a function, `transfer`: it is that dense.
+    /// `edge`, the longest of such cells, and `scale` are as [`Geometry`] has them.
+    pub(super) fn misses(self, edge: impl FnOnce() -> f64, scale: f64, transfer: &TransferFunction) -> bool {
+        let opacity = transfer.opacity().iter().fold(0.0, |most, k| k.1.max(most));
+        let emitted = if let Emission::Direct { scale } = transfer.emission() { scale } else { 0.0 };
+        self.cells && edge() * COARSE * transfer.extinction(opacity).max(emitted) > FAINT * scale
     }
 }
 
@@ -143,9 +160,9 @@ impl Backend {
     /// What it needs of a mesh.
     pub(super) fn needs(&self) -> Needs {
         match self {
-            Backend::Walk | Backend::Project(_) => Needs { neighbours: true, thickness: false },
-            Backend::WalkOnDevice(_) => Needs { neighbours: true, thickness: true },
-            Backend::ProjectOnDevice(_) => Needs { neighbours: false, thickness: true },
+            Backend::Walk | Backend::Project(_) => Needs { neighbours: true, thickness: false, cells: false },
+            Backend::WalkOnDevice(_) => Needs { neighbours: true, thickness: true, cells: false },
+            Backend::ProjectOnDevice(_) => Needs { neighbours: false, thickness: true, cells: true },
         }
     }
 

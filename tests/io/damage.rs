@@ -98,7 +98,7 @@ fn lies_about_sizes() {
     assert!(what.contains("the file's byte_order seems to be wrong"), "{what}");
     let mut moved = piece();
     let Values::F64(points) = &mut moved.points else { panic!("points are f64") };
-    points[0] = 0.25;
+    points[0] = 1.0 / 3.0;
     let moved = String::from_utf8(write(Style { mode: Mode::Inline, ..PLAIN }, &[moved])).unwrap();
     let what = malformed(moved.replace("UInt32", "UInt64").as_bytes());
     assert!(what.contains("the file's header_type seems to be wrong"), "{what}");
