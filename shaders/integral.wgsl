@@ -81,8 +81,11 @@ fn mild(depth: f32, rise: f32) -> vec4f {
     return vec4f(q + q * e, q + q * e, e * (q + uneven), e * e);
 }
 
-/// What a piece of optical depths `x` and `y` does: its opacity and the weights of the emission at its two ends.
-fn piece(x: f32, y: f32) -> vec3f {
+/// What a piece of the optical depths at its two ends does: its opacity and the weights of the emission there. What is below
+/// 0 is rounding, much of it beside great depths.
+fn piece(first_depth: f32, last_depth: f32) -> vec3f {
+    let x = max(first_depth, 0.0);
+    let y = max(last_depth, 0.0);
     // Beyond T(u) = DEEP nothing is seen: x u + (y − x) u²/2 = DEEP.
     var end = 1.0;
     if x + y > 2.0 * DEEP {

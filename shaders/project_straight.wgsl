@@ -125,7 +125,9 @@ fn by_lines(front: f32, back: f32, length: f32, words: Words) -> vec4f {
         let l = (end - at) * per_value;
         let middle = (at + end) * 0.5 - begin;
         let rise = select(at - end, end - at, rises);
-        let p = piece_of(fma(slope.x, middle, value.x) * l, slope.x * rise * l);
+        // Greater ones are opaque all the same, and less than 0 is rounding.
+        let depth = clamp(fma(slope.x, middle, value.x) * l, 0.0, GREATEST);
+        let p = piece_of(depth, clamp(slope.x * rise * l, -2.0 * depth, 2.0 * depth));
         // The weighted mean of the colours at both ends is that of one place.
         let place = fma(middle, p.y, rise * p.z);
         let color = fma(slope.yzw, vec3f(place), value.yzw * p.y) * select(1.0, l, DIRECT);

@@ -367,11 +367,10 @@ fn flat_cells_in_a_thick_mesh_are_drawn() {
         let squeezed = |z: f64| if z.abs() > 0.5 { z } else { height * f64::from(z > 0.0) };
         let mesh = draw::moved(&lattice, |p| turn * dvec3(p.x, p.y, squeezed(p.z)));
         let values: Vec<f64> = lattice.points().iter().map(|p| f64::from(p.z > 0.0)).collect();
-        for (name, unit, direct) in [("dense", 0.4 * height, false), ("lit", 1.0, true), ("mild", 0.5, false)] {
+        for (name, unit) in [("dense", 0.4 * height), ("mild", 0.5)] {
             let opacity = vec![(0.0, 0.0), (0.2, 1.0), (0.8, 0.5), (1.0, 0.0)];
             let transfer = TransferFunction::new(vec![(0.0, [0.3, 0.6, 0.9])], opacity, unit).unwrap();
-            let emission = if direct { Emission::Direct { scale: 0.5 / height } } else { Emission::Chromatic };
-            let scene = scene_of(&mesh, values.clone(), Association::Point, transfer.with_emission(emission).unwrap());
+            let scene = scene_of(&mesh, values.clone(), Association::Point, transfer);
             let view = view(Blend::Composite);
             let expected = Engine::Reference.image(&scene, &view);
             let seen = expected.pixels.iter().filter(|p| p[0] > 0.1).count();
@@ -389,6 +388,39 @@ fn flat_cells_in_a_thick_mesh_are_drawn() {
         }
     }
     report.finish("flat cells");
+}
+
+/// Extinction that falls from next to infinite to nothing between two knots is rounded to less than nothing, by much.
+#[test]
+fn extinction_that_falls_to_nothing_gives_numbers() {
+    let mesh = generate::tetrahedra(4);
+    let values: Vec<f64> = mesh.points().iter().map(|p| (3.0 * p.x + p.y).sin() + 0.2 * p.z * p.y).collect();
+    let mut devices = [render::Engine::Traverse, render::Engine::Project].map(common::on_device);
+    for k in 0..8 {
+        let end = 0.07 * f64::from(k) - 0.3;
+        let opacity = vec![(-1.3, 0.3), (end - 0.4, 0.02), (end, 0.0), (end + 0.3, 0.06), (1.2, 0.5)];
+        for (unit, convention) in
+            [(1e-320, Convention::Opacity), (1e-20, Convention::Opacity), (1e-20, Convention::Extinction)]
+        {
+            let color = vec![(-1.0, [0.8, 0.4, 0.2]), (end, [0.1, 0.9, 0.3]), (1.0, [0.2, 0.3, 0.9])];
+            let transfer = TransferFunction::new(color, opacity.clone(), unit).unwrap().with_convention(convention);
+            let scene = scene_of(&mesh, values.clone(), Association::Point, transfer);
+            let view = view(Blend::Composite);
+            let mut images = vec![("twin", TWIN.image(&scene, &view)), ("sweep", SWEEP.image(&scene, &view))];
+            for renderer in devices.iter_mut().flatten() {
+                set(renderer, &scene);
+                images.push(("device", renderer.render(&view, &|_| ()).unwrap()));
+            }
+            for (name, image) in images {
+                let seen = image.pixels.iter().filter(|p| p[3] > 0.0).count();
+                let right = |p: &[f32; 4]| {
+                    p.iter().all(|v| (0.0..=1.0 + 1e-5).contains(v)) && (p[3] == 0.0 || p[3] > 1.0 - 1e-5)
+                };
+                let wrong = image.pixels.iter().find(|p| !right(p));
+                assert!(seen > 100 && wrong.is_none(), "{name}, {end}, {unit:e}, {convention:?}: {wrong:?}");
+            }
+        }
+    }
 }
 
 /// Cases of the same kinds that users met, as far as they are at hand.

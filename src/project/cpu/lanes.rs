@@ -7,9 +7,12 @@ use fearless_simd::{Simd, f32x8, u32x8};
 /// Optical depth up to which the shorter series holds.
 const FAINT: f32 = 1.0 / 8.0;
 
-/// Opacity and the weights of the emission at both ends of pieces of optical depths `x` and `y`, none below 0.
+/// Opacity and the weights of the emission at both ends of pieces of optical depths `x` and `y`. What is below 0 is rounding,
+/// much of it beside great depths, and taken for 0.
 #[inline(always)]
 pub(super) fn piece<S: Simd>(simd: S, x: f32x8<S>, y: f32x8<S>, direct: bool) -> [f32x8<S>; 3] {
+    let zero = f32x8::splat(simd, 0.0);
+    let (x, y) = (x.max(zero), y.max(zero));
     let steepest = x.max(y);
     let most = |depth: f32| steepest.simd_gt(f32x8::splat(simd, depth)).to_bitmask();
     if !direct && most(FAINT) == 0 {
