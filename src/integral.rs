@@ -144,11 +144,12 @@ impl<R: Real> Piece<R> {
         gauss(&GAUSS_6, x, y, R::of(0.0), R::of(1.0), direct, Self::NONE())
     }
 
-    /// A piece of optical depths `x` (τ_f l) and `y` (τ_b l), both finite and at least 0. Error at most 1e-6, and 1e-5
-    /// of α.
+    /// A piece of optical depths `x` (τ_f l) and `y` (τ_b l), both finite; what is below 0 is taken for 0, as rounding
+    /// beside great depths may be. Error at most 1e-6, and 1e-5 of α.
     #[inline(always)]
     pub fn new(x: R, y: R, direct: bool) -> Self {
         let (zero, one) = (R::of(0.0), R::of(1.0));
+        let (x, y) = (x.max(zero), y.max(zero));
         let steepest = x.max(y);
         if steepest <= R::of(MILD) {
             return Piece::mild(x, y, direct);

@@ -66,7 +66,8 @@ impl Batch {
         let (mut x, mut y) = ([0.0; BATCH], [0.0; BATCH]);
         let pieces = self.front.iter().zip(&self.back).zip(&self.length).take(self.len);
         for (((front, back), length), (x, y)) in pieces.clone().zip(x.iter_mut().zip(&mut y)) {
-            (*x, *y) = (front[0] * length, back[0] * length);
+            // What is below 0 is rounding, much of it beside great depths.
+            (*x, *y) = ((front[0] * length).max(0.0), (back[0] * length).max(0.0));
         }
         let all_mild = x.iter().zip(&y).all(|(x, y)| x.max(*y) <= MILD as f32);
         let moderate = match (all_mild, direct) {
