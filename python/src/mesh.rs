@@ -1,0 +1,205 @@
+//! Meshes and grids, from files and from numpy's arrays.
+
+use crate::{Error, raised};
+use glam::{DMat3, DVec3};
+use halite::grid::{Grid, Lattice};
+use halite::io::{DataSet, Source, Time};
+use halite::mesh::{Array, Arrays, Cells, Polyhedra, Values};
+use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use std::path::PathBuf;
+
+/// A mesh, or a regular or rectilinear grid, with its arrays; it never changes.
+#[pyclass(module = "halite._halite", frozen)]
+pub(crate) struct Mesh(pub(crate) DataSet);
+
+/// A name, values of points or of cells.
+type Given<'py> = (String, Bound<'py, PyAny>);
+
+#[pymethods]
+impl Mesh {
+    #[staticmethod]
+    #[pyo3(signature = (path, step=None, time=None))]
+    fn read(py: Python<'_>, path: PathBuf, step: Option<usize>, time: Option<f64>) -> PyResult<Self> {
+        let time = match (step, time) {
+            (Some(step), _) => Time::Step(step),
+            (None, Some(value)) => Time::Value(value),
+            (None, None) => Time::Step(0),
+        };
+        let read = || {
+            let source = Source::open(&path)?;
+            source.read_data_set(source.step(time)?, &|_| {})
+        };
+        py.detach(read).map(Mesh).map_err(raised)
+    }
+
+    #[staticmethod]
+    fn from_arrays(
+        points: PyReadonlyArray2<'_, f64>,
+        connectivity: PyReadonlyArray1<'_, i64>,
+        offsets: PyReadonlyArray1<'_, i64>,
+        types: PyReadonlyArray1<'_, u8>,
+        polyhedra: Option<[PyReadonlyArray1<'_, i64>; 3]>,
+        point_data: Vec<Given<'_>>,
+        cell_data: Vec<Given<'_>>,
+    ) -> PyResult<Self> {
+        let cells = Cells {
+            types: types.as_slice()?.to_vec(),
+            offsets: counts("offsets", &offsets)?,
+            connectivity: indices(&connectivity)?,
+        };
+        let (of_points, of_cells) = (arrays(point_data)?, arrays(cell_data)?);
+        let mut mesh = halite::mesh::Mesh::new(triples(&points)?, cells, of_points, of_cells).map_err(raised)?;
+        if let Some([cells, faces, points]) = polyhedra {
+            let polyhedra = Polyhedra {
+                cells: counts("faces of cells", &cells)?,
+                faces: counts("points of faces", &faces)?,
+                points: indices(&points)?,
+            };
+            mesh.set_polyhedra(polyhedra).map_err(raised)?;
+        }
+        Ok(Mesh(DataSet::Mesh(mesh)))
+    }
+
+    #[staticmethod]
+    fn image(
+        origin: [f64; 3],
+        spacing: [f64; 3],
+        direction: [[f64; 3]; 3],
+        first: [i64; 3],
+        size: [usize; 3],
+        point_data: Vec<Given<'_>>,
+        cell_data: Vec<Given<'_>>,
+    ) -> PyResult<Self> {
+        let direction = DMat3::from_cols_array_2d(&direction).transpose();
+        let lattice = Lattice { origin: origin.into(), spacing: spacing.into(), direction, first, size };
+        let grid = Grid::regular(&lattice, arrays(point_data)?, arrays(cell_data)?).map_err(raised)?;
+        Ok(Mesh(DataSet::Grid(grid)))
+    }
+
+    #[staticmethod]
+    fn rectilinear(axes: [Vec<f64>; 3], point_data: Vec<Given<'_>>, cell_data: Vec<Given<'_>>) -> PyResult<Self> {
+        let grid = Grid::rectilinear(axes, arrays(point_data)?, arrays(cell_data)?).map_err(raised)?;
+        Ok(Mesh(DataSet::Grid(grid)))
+    }
+
+    #[getter]
+    fn n_points(&self) -> usize {
+        match &self.0 {
+            DataSet::Mesh(mesh) => mesh.points().len(),
+            DataSet::Grid(grid) => grid.point_count(),
+        }
+    }
+
+    #[getter]
+    fn n_cells(&self) -> usize {
+        self.arrays().cell_count()
+    }
+
+    #[getter]
+    fn is_grid(&self) -> bool {
+        matches!(self.0, DataSet::Grid(_))
+    }
+
+    /// Least and greatest x, y and z of the points; those that are not finite are left out.
+    #[getter]
+    fn bounds(&self) -> [f64; 6] {
+        let [low, high] = match &self.0 {
+            DataSet::Mesh(mesh) => hull(mesh.points().iter().copied()),
+            DataSet::Grid(grid) => {
+                let axes = grid.axes();
+                let ends = |a: usize| [axes[a][0], axes[a][axes[a].len() - 1]];
+                let corner =
+                    |c: usize| grid.origin() + grid.direction() * DVec3::from([0, 1, 2].map(|a| ends(a)[c >> a & 1]));
+                hull((0..8).map(corner))
+            }
+        };
+        [low.x, high.x, low.y, high.y, low.z, high.z]
+    }
+
+    /// Name, "point" or "cell", and components of each array.
+    #[getter]
+    fn array_list(&self) -> Vec<(String, &'static str, usize)> {
+        let of = |all: &[Array], what: &'static str| {
+            all.iter().map(move |a| (a.name.clone(), what, a.components)).collect::<Vec<_>>()
+        };
+        let mut all = of(self.arrays().point_arrays(), "point");
+        all.extend(of(self.arrays().cell_arrays(), "cell"));
+        all
+    }
+
+    /// The least and the greatest finite value of an array: of a component, or of the length of its tuples.
+    fn range(&self, name: &str, of_cells: bool, component: Option<usize>) -> PyResult<[f64; 2]> {
+        let array = self.array(name, of_cells)?;
+        let n = array.components;
+        let value = |t: usize| match component {
+            Some(k) => array.values.get(n * t + k.min(n - 1)),
+            None if n == 1 => array.values.get(t),
+            None => (0..n).map(|k| array.values.get(n * t + k).powi(2)).sum::<f64>().sqrt(),
+        };
+        let none = [f64::INFINITY, f64::NEG_INFINITY];
+        let values = (0..array.tuples()).map(value).filter(|v| v.is_finite());
+        Ok(values.fold(none, |[lo, hi], v| [lo.min(v), hi.max(v)]))
+    }
+}
+
+impl Mesh {
+    pub(crate) fn arrays(&self) -> &dyn Arrays {
+        match &self.0 {
+            DataSet::Mesh(mesh) => mesh,
+            DataSet::Grid(grid) => grid,
+        }
+    }
+
+    pub(crate) fn array(&self, name: &str, of_cells: bool) -> PyResult<&Array> {
+        let (all, what) = match of_cells {
+            true => (self.arrays().cell_arrays(), "cells"),
+            false => (self.arrays().point_arrays(), "points"),
+        };
+        let known = || all.iter().map(|a| format!("\"{}\"", a.name)).collect::<Vec<_>>().join(", ");
+        all.iter()
+            .find(|a| a.name == name)
+            .ok_or_else(|| Error::new_err(format!("no array of {what} is called \"{name}\"; there are {}", known())))
+    }
+}
+
+fn hull(points: impl Iterator<Item = DVec3>) -> [DVec3; 2] {
+    let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+    points.filter(|p| p.is_finite()).fold(none, |[low, high], p| [low.min(p), high.max(p)])
+}
+
+fn triples(points: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<DVec3>> {
+    if points.shape()[1] != 3 {
+        let [n, k] = [points.shape()[0], points.shape()[1]];
+        return Err(Error::new_err(format!("points have the shape ({n}, {k}), and not (n, 3)")));
+    }
+    Ok(points.as_slice()?.as_chunks().0.iter().map(|&p| DVec3::from_array(p)).collect())
+}
+
+fn counts(what: &str, numbers: &PyReadonlyArray1<'_, i64>) -> PyResult<Vec<u64>> {
+    let one = |&n: &i64| u64::try_from(n).map_err(|_| Error::new_err(format!("{what}: {n} is negative")));
+    numbers.as_slice()?.iter().map(one).collect()
+}
+
+fn indices(numbers: &PyReadonlyArray1<'_, i64>) -> PyResult<Vec<u32>> {
+    let one = |&n: &i64| u32::try_from(n).map_err(|_| Error::new_err(format!("{n} is the number of no point")));
+    numbers.as_slice()?.iter().map(one).collect()
+}
+
+fn arrays(given: Vec<Given<'_>>) -> PyResult<Vec<Array>> {
+    given.into_iter().map(|(name, values)| array(name, &values)).collect()
+}
+
+/// An array of shape (n,) or (n, components), in its own type of number.
+pub(crate) fn array(name: String, given: &Bound<'_, PyAny>) -> PyResult<Array> {
+    macro_rules! of {
+        ($($type:ty => $variant:ident),*) => {
+            $(if let Ok(array) = given.cast::<PyArrayDyn<$type>>() {
+                let components = array.shape().get(1..).map_or(1, |s| s.iter().product());
+                return Ok(Array { name, components, values: Values::$variant(array.readonly().as_slice()?.to_vec()) });
+            })*
+        };
+    }
+    of!(f64 => F64, f32 => F32, u8 => U8, i8 => I8, u16 => U16, i16 => I16, u32 => U32, i32 => I32, u64 => U64, i64 => I64);
+    Err(Error::new_err(format!("the array \"{name}\" is none of integers or floats of 8 to 64 bits")))
+}

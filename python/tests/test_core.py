@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Meshes, functions, views and pictures, without VTK."""
+import doctest
+import pickle
+import threading
+
+import numpy as np
+import pytest
+
+import halite
+from conftest import chord, lattice, look_at, perspective
+
+
+def test_examples_run():
+    failed, tried = doctest.testmod(halite)
+    assert failed == 0 and tried > 5
+
+
+def test_pictures_are_the_integral(box, fog):
+    eye, clip = look_at((3, -2.5, 2)), perspective(35, 4 / 3, 0.5, 20)
+    view = halite.View.from_matrices(eye, clip, (64, 48))
+    picture = halite.Renderer(box, "s", transfer=fog).render(view)
+    assert picture.shape == (48, 64, 4) and picture.dtype == np.float32
+    truth = chord(clip @ eye, 64, 48)
+    assert truth[..., 3].max() > 0.9 and np.abs(picture - truth).max() < 2e-6
+    # Depths end rays.
+    depth = np.full((48, 64), 0.9, np.float32)
+    depth[:, 20:] = 1.0
+    cut = halite.Renderer(box, "s", transfer=fog).render(view, depth)
+    assert np.abs(cut - chord(clip @ eye, 64, 48, np.where(depth < 1, depth, 1.0))).max() < 1e-4
+
+
+def test_views_are_vtks(box, fog):
+    renderer = halite.Renderer(box, "s", transfer=fog)
+    by_camera = renderer.render(halite.View((3, -2.5, 2), view_up=(0, 0, 1), view_angle=35, size=(64, 48)))
+    eye, clip = look_at((3, -2.5, 2)), perspective(35, 4 / 3, 0.5, 20)
+    assert np.abs(by_camera - chord(clip @ eye, 64, 48)).max() < 2e-6
+    half = renderer.render(halite.View((0, 0, 9), parallel_scale=2, size=(40, 40), planes=[((0, 0, 0), (1, 0, 0))]))
+    assert half[20, 5:19, 3].max() == 0 and half[20, 22:28, 3].min() > 0.5
+
+
+def test_arrays_and_components(box, fog):
+    assert (box.n_points, box.n_cells, box.bounds) == (27, 8, (-1, 1, -1, 1, -1, 1))
+    assert box.arrays == [("s", "point", 1), ("c", "cell", 1)] and box.range("c") == (0, 7)
+    renderer = halite.Renderer(box, "c", transfer=fog)
+    renderer.set_scalars(np.zeros((27, 3), np.float32))
+    with pytest.raises(halite.Error, match='no array is called "t"; there are "s", "c"'):
+        renderer.set_scalars("t")
+    with pytest.raises(halite.Error, match="5"):
+        renderer.set_scalars(np.zeros(5))
+
+
+def test_what_is_wrong_is_named():
+    points, cells, offsets, types = lattice()
+    with pytest.raises(halite.Error, match="99"):
+        halite.Mesh.from_arrays(points, np.where(cells == 0, 99, cells), offsets, types)
+    with pytest.raises(halite.Error, match="-1"):
+        halite.Mesh.from_arrays(points, np.where(cells == 0, -1, cells), offsets, types)
+    with pytest.raises(halite.Error, match=r"\(27, 2\)"):
+        halite.Mesh.from_arrays(points[:, :2], cells, offsets, types)
+    with pytest.raises(halite.Error, match="26"):
+        halite.Mesh.from_arrays(points, cells, offsets, types, point_data={"s": np.zeros(26)})
+    with pytest.raises(OSError):
+        halite.read("nowhere.vtu")
+    with pytest.raises(halite.Error, match="no colour map|nothing"):
+        halite.TransferFunction("nothing")
+    with pytest.raises(halite.Error, match="opaque"):
+        halite.TransferFunction(convention="opaque")
+
+
+def test_frames_can_be_ended(box, fog):
+    renderer = halite.Renderer(box, "s", transfer=fog, engine="traverse", threads=1)
+    view = halite.View((3, -2.5, 2), size=(2500, 2500))
+    shares = []
+    assert renderer.render(view, progress=lambda share: shares.append(share) or len(shares) < 2) is None
+    assert len(shares) >= 2
+
+    def wrong(share):
+        raise ValueError("no more")
+
+    with pytest.raises(ValueError, match="no more"):
+        renderer.render(view, progress=wrong)
+    assert renderer.render(halite.View((3, -2.5, 2), size=(20, 20))) is not None
+
+
+def test_threads_take_turns(box, fog):
+    renderer = halite.Renderer(box, "s", transfer=fog)
+    view, pictures = halite.View((3, -2.5, 2), size=(50, 50)), []
+    threads = [threading.Thread(target=lambda: pictures.append(renderer.render(view))) for _ in range(4)]
+    [t.start() for t in threads]
+    [t.join() for t in threads]
+    assert len(pictures) == 4 and all((p == pictures[0]).all() for p in pictures)
+
+
+def test_pickling_says_why_not(box):
+    for thing in (box, halite.Renderer(box)):
+        with pytest.raises(TypeError, match="pickled"):
+            pickle.dumps(thing)
+
+
+def test_grids():
+    values = np.random.default_rng(1).uniform(size=(4, 3, 5))
+    grid = halite.Mesh.image((5, 3, 4), spacing=(0.5, 1, 0.7), point_data={"v": values.ravel()})
+    assert grid.is_grid and grid.bounds == (0, 2, 0, 2, 0, pytest.approx(2.1))
+    view = halite.View((5, 4, 6), (1, 1, 1), size=(30, 30))
+    axes = [np.arange(n) * d for n, d in ((5, 0.5), (3, 1), (4, 0.7))]
+    pictures = [halite.Renderer(g).render(view) for g in (grid, halite.Mesh.rectilinear(*axes, point_data={"v": values.ravel()}))]
+    assert pictures[0][..., 3].max() > 0.1 and np.abs(pictures[0] - pictures[1]).max() < 1e-6
+
+
+def test_pictures_are_files(box, tmp_path):
+    picture = halite.show(box, size=(60, 40))
+    assert picture._repr_png_()[:4] == b"\x89PNG" and picture.pixels[..., 3].max() > 0.05
+    halite.write(tmp_path / "p.npy", picture.pixels)
+    assert (np.load(tmp_path / "p.npy") == picture.pixels).all()
+    picture.save(tmp_path / "p.png")
+    assert (tmp_path / "p.png").stat().st_size > 100
+
+
+def test_light_and_widgets(box):
+    points, cells, offsets, types = lattice()
+    mesh = halite.Mesh.from_arrays(points, cells, offsets, types, point_data={"x": points[:, 0]})
+    view = halite.View((3, -2.5, 2), size=(30, 30))
+    looks = [{}, {"shade": True}, {"silhouette": 2}, {"gradient_opacity": [(0, 0), (2, 1)]},
+             {"widgets": [{"type": "gaussian", "center": [0, 1], "sigma": [0.3, 1], "color": [1, 0, 0], "opacity": 2}]}]
+    pictures = [halite.Renderer(mesh, transfer=halite.TransferFunction("viridis", (-1, 1), **look)).render(view) for look in looks]
+    for a in range(len(looks)):
+        assert pictures[a][..., 3].max() > 0.1
+        assert all(np.abs(pictures[a] - p).max() > 0.01 for p in pictures[:a])

@@ -1,0 +1,322 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Volumes in windows of VTK, pixel by pixel against the truth."""
+import gc
+
+import numpy as np
+import pytest
+
+pytest.importorskip("vtkmodules")
+
+from vtkmodules import vtkCommonCore, vtkCommonDataModel, vtkFiltersSources, vtkRenderingCore  # noqa: E402
+from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy  # noqa: E402
+
+import halite  # noqa: E402
+import halite.vtk  # noqa: E402
+from conftest import chord, lattice  # noqa: E402
+
+SIZE = (120, 90)
+NEAR = 1.1
+
+
+def grid(values=None):
+    points, cells, offsets, types = lattice()
+    g = vtkCommonDataModel.vtkUnstructuredGrid()
+    p = vtkCommonCore.vtkPoints()
+    p.SetData(numpy_to_vtk(points, deep=1))
+    g.SetPoints(p)
+    g.Allocate(8)
+    for c, kind in enumerate(types):
+        g.InsertNextCell(int(kind), 8, [int(i) for i in cells[8 * c:8 * c + 8]])
+    a = numpy_to_vtk(np.ones(len(points)) if values is None else values, deep=1)
+    a.SetName("s")
+    g.GetPointData().SetScalars(a)
+    return g
+
+
+def window(*renderers, samples=0, size=SIZE):
+    w = vtkRenderingCore.vtkRenderWindow()
+    w.SetOffScreenRendering(1)
+    w.SetMultiSamples(samples)
+    w.SetAlphaBitPlanes(1)
+    w.SetSize(*size)
+    for r in renderers:
+        w.AddRenderer(r)
+    return w
+
+
+def renderer(background=(0, 0, 0), viewport=(0, 0, 1, 1)):
+    r = vtkRenderingCore.vtkRenderer()
+    r.SetBackground(*background)
+    r.SetViewport(*viewport)
+    c = r.GetActiveCamera()
+    c.SetPosition(3, -2.5, 2)
+    c.SetViewUp(0, 0, 1)
+    return r
+
+
+def plane(distance, color=(0.2, 0.4, 0.8)):
+    """An opaque square that looks at the camera, so far from the origin towards it."""
+    s = vtkFiltersSources.vtkPlaneSource()
+    s.SetOrigin(-9, -9, 0)
+    s.SetPoint1(9, -9, 0)
+    s.SetPoint2(-9, 9, 0)
+    n = np.array([3, -2.5, 2]) / np.linalg.norm([3, -2.5, 2])
+    s.SetNormal(*n)
+    s.SetCenter(*(n * distance))
+    m = vtkRenderingCore.vtkPolyDataMapper()
+    m.SetInputConnection(s.GetOutputPort())
+    a = vtkRenderingCore.vtkActor()
+    a.SetMapper(m)
+    a.GetProperty().LightingOff()
+    a.GetProperty().SetColor(*color)
+    return a
+
+
+def pixels(w, render=True):
+    if render:
+        w.Render()
+    out = vtkCommonCore.vtkUnsignedCharArray()
+    width, height = w.GetSize()
+    w.GetRGBACharPixelData(0, 0, width - 1, height - 1, 0, out)
+    return vtk_to_numpy(out).reshape(height, width, 4)[::-1].astype(float)
+
+
+def to_clip(r):
+    rows = lambda m: np.array([[m.GetElement(i, j) for j in range(4)] for i in range(4)])
+    c = r.GetActiveCamera()
+    return rows(c.GetProjectionTransformMatrix(r.GetTiledAspectRatio(), -1, 1)) @ rows(c.GetModelViewTransformMatrix())
+
+
+def over(front, back):
+    return 255 * (front[..., :3] + (1 - front[..., 3:]) * np.asarray(back))
+
+
+def depth_of(r, distance):
+    """The window depth of :func:`plane`."""
+    n = np.array([3, -2.5, 2]) / np.linalg.norm([3, -2.5, 2])
+    p = to_clip(r) @ np.append(n * distance, 1)
+    return 0.5 + 0.5 * p[2] / p[3]
+
+
+@pytest.fixture
+def fog():
+    from conftest import COLOR, K
+    return halite.TransferFunction([(0, *COLOR)], opacity=1.0, unit_distance=1 / K)
+
+
+@pytest.mark.parametrize("parallel", [False, True])
+@pytest.mark.parametrize("distance", [None, -4.0, 0.0, 2.5])
+def test_opaque_geometry(fog, distance, parallel):
+    r = renderer((0.2, 0, 0.4))
+    r.GetActiveCamera().SetParallelProjection(parallel)
+    r.GetActiveCamera().SetParallelScale(1.9)
+    halite.vtk.add_volume(r, grid(), transfer=fog)
+    behind, depth = (0.2, 0, 0.4), None
+    if distance is not None:
+        r.AddActor(plane(distance))
+        behind = (0.2, 0.4, 0.8)
+    w = window(r)
+    r.ResetCameraClippingRange()
+    w.Render()
+    if distance is not None:
+        depth = np.full(SIZE[::-1], depth_of(r, distance))
+    truth = chord(to_clip(r), *SIZE, depth)
+    assert truth[..., 3].max() > 0.8 or distance == 2.5
+    assert np.abs(pixels(w)[..., :3] - over(truth, behind)).max() < NEAR
+
+
+def test_viewports_and_layers(fog):
+    views = [(0, 0, 0.5, 1), (0.5, 0, 1, 0.5), (0.5, 0.5, 1, 1)]
+    all_of = [renderer((0.2 * k, 0, 0), v) for k, v in enumerate(views)]
+    volume = halite.vtk.Volume(grid(), transfer=fog)
+    for r in all_of:
+        volume.add_to(r)
+    w = window(*all_of)
+    picture = pixels(w)
+    width, height = SIZE
+    for k, (r, v) in enumerate(zip(all_of, views)):
+        part = picture[round((1 - v[3]) * height):round((1 - v[1]) * height), round(v[0] * width):round(v[2] * width), :3]
+        assert np.abs(part - over(chord(to_clip(r), part.shape[1], part.shape[0]), (0.2 * k, 0, 0))).max() < NEAR
+    top = renderer()
+    top.SetLayer(1)
+    w = window(renderer((0.4, 0.4, 0.4)), top)
+    w.SetNumberOfLayers(2)
+    halite.vtk.add_volume(top, grid(), transfer=fog)
+    top.ResetCameraClippingRange()
+    assert np.abs(pixels(w)[..., :3] - over(chord(to_clip(top), *SIZE), (0.4, 0.4, 0.4))).max() < NEAR
+
+
+@pytest.mark.parametrize("what", ["fxaa", "peeling", "peeling of volumes", "tiles"])
+def test_the_ways_of_vtk(fog, what):
+    r = renderer()
+    halite.vtk.add_volume(r, grid(), transfer=fog)
+    w = window(r)
+    if what == "fxaa":
+        r.UseFXAAOn()
+    elif what.startswith("peeling"):
+        r.UseDepthPeelingOn()
+        r.SetUseDepthPeelingForVolumes(what == "peeling of volumes")
+    r.ResetCameraClippingRange()
+    truth = over(chord(to_clip(r), *SIZE), (0, 0, 0))
+    if what == "tiles":
+        shot = vtkRenderingCore.vtkWindowToImageFilter()
+        shot.SetInput(w)
+        shot.SetScale(2)
+        shot.SetInputBufferTypeToRGBA()
+        shot.Update()
+        image = shot.GetOutput()
+        tiled = vtk_to_numpy(image.GetPointData().GetScalars()).reshape(2 * SIZE[1], 2 * SIZE[0], 4)[::-1].astype(float)
+        big = over(chord(to_clip(r), 2 * SIZE[0], 2 * SIZE[1]), (0, 0, 0))
+        assert np.abs(tiled[..., :3] - big).max() < NEAR
+    # FXAA blends over edges.
+    near = NEAR if what != "fxaa" else 40
+    assert np.abs(pixels(w)[..., :3] - truth).max() < near
+
+
+def test_alpha(fog):
+    r = renderer()
+    r.SetBackgroundAlpha(0.5)
+    halite.vtk.add_volume(r, grid(), transfer=fog)
+    w = window(r)
+    picture, truth = pixels(w), chord(to_clip(r), *SIZE)
+    assert np.abs(picture[..., 3] - 255 * (truth[..., 3] + (1 - truth[..., 3]) * 0.5)).max() < NEAR
+
+
+def test_changes_are_followed(fog):
+    r, g = renderer(), grid()
+    v = halite.vtk.add_volume(r, g, transfer=fog)
+    w = window(r)
+    r.ResetCameraClippingRange()
+    first = pixels(w)
+    frames = v.frames
+    pixels(w)
+    assert v.frames == frames > 0, "a still frame costs nothing"
+    v.transfer = halite.TransferFunction([(0, 0, 1, 0)], opacity=1.0, unit_distance=0.5)
+    green = pixels(w)
+    assert np.abs(green - first).max() > 50
+    # Values: thin where they are 0.
+    v.transfer = halite.TransferFunction([(0, 1, 1, 1)], opacity=[(0, 0), (1, 2)])
+    full = pixels(w)
+    vtk_to_numpy(g.GetPointData().GetScalars())[:] = 0
+    g.GetPointData().GetScalars().Modified()
+    assert pixels(w)[..., :3].max() == 0 and full[..., :3].max() > 100
+    v.SetVisibility(False)
+    frames = v.frames
+    pixels(w)
+    assert v.frames == frames
+    v.SetVisibility(True)
+    vtk_to_numpy(g.GetPointData().GetScalars())[:] = 1
+    g.GetPointData().GetScalars().Modified()
+    v.SetPosition(50, 0, 0)
+    r.ResetCameraClippingRange()
+    assert pixels(w)[..., :3].max() == 0
+    r.RemoveViewProp(v)
+    pixels(w)
+
+
+def test_dragging_is_coarser(fog):
+    r = renderer()
+    v = halite.vtk.add_volume(r, grid(), transfer=fog)
+    w = window(r)
+    still = pixels(w)
+    w.SetDesiredUpdateRate(15)
+    coarse = pixels(w)
+    assert 0 < np.abs(still - coarse).mean() < 6
+    w.SetDesiredUpdateRate(0.0001)
+    assert (pixels(w) == still).all() and v.error is None
+
+
+def test_bounds_and_picking(fog):
+    r = renderer()
+    v = halite.vtk.add_volume(r, grid(), transfer=fog)
+    assert v.GetBounds() == pytest.approx((-1, 1, -1, 1, -1, 1))
+    back = plane(-4.0)
+    r.AddActor(back)
+    w = window(r)
+    r.ResetCameraClippingRange()
+    w.Render()
+    selector = vtkRenderingCore.vtkHardwareSelector()
+    selector.SetRenderer(r)
+    selector.SetArea(SIZE[0] // 2, SIZE[1] // 2, SIZE[0] // 2, SIZE[1] // 2)
+    found = selector.Select()
+    assert found.GetNumberOfNodes() == 1
+    assert v.error is None
+
+
+def test_errors_are_seen_and_survived(fog):
+    r, g = renderer(), grid()
+    v = halite.vtk.add_volume(r, g, transfer=fog)
+    w = window(r)
+    good = pixels(w)
+    v.scalars = "nothing"
+    g.Modified()
+    w.Render()
+    assert isinstance(v.error, halite.Error) and "nothing" in str(v.error)
+    v.scalars = "s"
+    assert (pixels(w) == good).all() and v.error is None
+    with pytest.raises(halite.Error, match="vtkPolyData"):
+        halite.vtk.add_volume(r, vtkCommonDataModel.vtkPolyData())
+
+
+def test_windows_come_and_go(fog):
+    r = renderer()
+    v = halite.vtk.add_volume(r, grid(), transfer=fog)
+    first = pixels(window(r))
+    for _ in range(3):
+        w = window(r)
+        assert (pixels(w) == first).all()
+        w.Finalize()
+        w.RemoveRenderer(r)
+    for _ in range(20):
+        r.RemoveViewProp(v)
+        del v
+        gc.collect()
+        v = halite.vtk.add_volume(r, grid(), transfer=fog)
+    assert (pixels(window(r)) == first).all()
+
+
+def test_kinds_of_grids():
+    structured = vtkCommonDataModel.vtkStructuredGrid()
+    structured.SetDimensions(3, 3, 3)
+    structured.SetPoints(grid().GetPoints())
+    image = vtkCommonDataModel.vtkImageData()
+    image.SetDimensions(3, 3, 3)
+    image.SetOrigin(-1, -1, -1)
+    rectilinear = vtkCommonDataModel.vtkRectilinearGrid()
+    rectilinear.SetDimensions(3, 3, 3)
+    for axis in "XYZ":
+        getattr(rectilinear, f"Set{axis}Coordinates")(numpy_to_vtk(np.array([-1.0, 0, 1]), deep=1))
+    points = lattice()[0]
+    view = halite.View((3, -2.5, 2), view_up=(0, 0, 1), size=(40, 40))
+    transfer = halite.TransferFunction("viridis", (-1, 1), opacity=[0.2, 1])
+    pictures = []
+    for g in (grid(points[:, 0]), structured, image, rectilinear):
+        if g.GetPointData().GetScalars() is None:
+            a = numpy_to_vtk(points[:, 0].copy(), deep=1)
+            a.SetName("s")
+            g.GetPointData().SetScalars(a)
+        pictures.append(halite.Renderer(halite.Mesh.from_vtk(g), "s", transfer=transfer).render(view))
+    assert pictures[0][..., 3].max() > 0.3
+    assert all(np.abs(p - pictures[0]).max() < 2e-6 for p in pictures[1:])
+
+
+def test_polyhedra():
+    g = vtkCommonDataModel.vtkUnstructuredGrid()
+    points, cells, offsets, types = lattice(1)
+    p = vtkCommonCore.vtkPoints()
+    p.SetData(numpy_to_vtk(points, deep=1))
+    g.SetPoints(p)
+    faces = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]]
+    ids = vtkCommonCore.vtkIdList()
+    for i in [len(faces)] + [x for f in faces for x in [len(f), *f]]:
+        ids.InsertNextId(i)
+    g.InsertNextCell(42, ids)
+    mesh = halite.Mesh.from_vtk(g)
+    assert mesh.n_cells == 1
+    box = halite.Mesh.from_arrays(points, cells, offsets, types, point_data={"s": points[:, 0]})
+    a = numpy_to_vtk(points[:, 0].copy(), deep=1)
+    a.SetName("s")
+    g.GetPointData().SetScalars(a)
+    view = halite.View((3, -2.5, 2), view_up=(0, 0, 1), size=(40, 40))
+    pictures = [halite.Renderer(m).render(view) for m in (box, halite.Mesh.from_vtk(g))]
+    assert np.abs(pictures[0] - pictures[1]).max() < 1e-5 and pictures[0][..., 3].max() > 0.1
