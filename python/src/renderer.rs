@@ -125,7 +125,7 @@ impl Renderer {
                 let go_on = Python::attach(|py| {
                     py.check_signals()?;
                     match &progress {
-                        Some(call) => Ok(!call.call1(py, (share,))?.bind(py).is(&pyo3::types::PyBool::new(py, false))),
+                        Some(call) => Ok(!call.call1(py, (share,))?.bind(py).is(pyo3::types::PyBool::new(py, false))),
                         None => Ok(true),
                     }
                 });
