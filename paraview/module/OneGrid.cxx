@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+#include "OneGrid.h"
+
+#include "vtkAppendFilter.h"
+#include "vtkCompositeDataSet.h"
+#include "vtkDataSet.h"
+#include "vtkExtractBlockUsingDataAssembly.h"
+#include "vtkMergeBlocks.h"
+#include "vtkUnstructuredGrid.h"
+
+namespace
+{
+
+vtkUnstructuredGrid* Merged(vtkDataObject* blocks, vtkMergeBlocks* merge)
+{
+  merge->SetInputData(blocks);
+  // Neighbours are found by where their points are, whichever block these belong to.
+  merge->MergePointsOff();
+  merge->Update();
+  return vtkUnstructuredGrid::SafeDownCast(merge->GetOutputDataObject(0));
+}
+
+}
+
+OneGrid::OneGrid() = default;
+OneGrid::~OneGrid() = default;
+
+void OneGrid::SetAssembly(const char* name)
+{
+  this->Blocks->SetAssemblyName(name);
+}
+
+void OneGrid::AddSelector(const char* selector)
+{
+  this->Blocks->AddSelector(selector);
+}
+
+void OneGrid::ClearSelectors()
+{
+  this->Blocks->ClearSelectors();
+}
+
+vtkSmartPointer<vtkUnstructuredGrid> OneGrid::Of(vtkDataObject* input)
+{
+  auto grid = vtkSmartPointer<vtkUnstructuredGrid>::New();
+  if (vtkCompositeDataSet::SafeDownCast(input))
+  {
+    this->Blocks->SetInputData(input);
+    this->Blocks->Update();
+    vtkNew<vtkMergeBlocks> merge;
+    if (vtkUnstructuredGrid* merged = Merged(this->Blocks->GetOutputDataObject(0), merge))
+    {
+      grid->ShallowCopy(merged);
+    }
+    this->Blocks->SetInputData(nullptr);
+  }
+  else if (auto unstructured = vtkUnstructuredGrid::SafeDownCast(input))
+  {
+    grid->ShallowCopy(unstructured);
+  }
+  else if (auto other = vtkDataSet::SafeDownCast(input))
+  {
+    vtkNew<vtkAppendFilter> append;
+    append->AddInputData(other);
+    append->Update();
+    grid->ShallowCopy(append->GetOutput());
+  }
+  if (grid->HasAnyGhostCells())
+  {
+    grid->RemoveGhostCells();
+  }
+  return grid;
+}

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+#include "vtkHaliteVolumeRepresentation.h"
+
+#include "OneGrid.h"
+#include "vtkHaliteMapper.h"
+
+#include "vtkAlgorithmOutput.h"
+#include "vtkInformation.h"
+#include "vtkInformationVector.h"
+#include "vtkMath.h"
+#include "vtkMatrix4x4.h"
+#include "vtkObjectFactory.h"
+#include "vtkPVGeometryFilter.h"
+#include "vtkPVRenderView.h"
+#include "vtkPolyDataMapper.h"
+#include "vtkUnstructuredGrid.h"
+
+struct vtkHaliteVolumeRepresentation::Internals
+{
+  OneGrid Input;
+  vtkSmartPointer<vtkUnstructuredGrid> Grid = vtkSmartPointer<vtkUnstructuredGrid>::New();
+};
+
+vtkStandardNewMacro(vtkHaliteVolumeRepresentation);
+
+vtkHaliteVolumeRepresentation::vtkHaliteVolumeRepresentation()
+  : Inner(new Internals)
+{
+}
+
+vtkHaliteVolumeRepresentation::~vtkHaliteVolumeRepresentation() = default;
+
+vtkHaliteMapper* vtkHaliteVolumeRepresentation::GetHalite()
+{
+  return vtkHaliteMapper::SafeDownCast(this->GetActiveVolumeMapper());
+}
+
+void vtkHaliteVolumeRepresentation::SetActiveAssembly(const char* name)
+{
+  this->Inner->Input.SetAssembly(name);
+  this->Superclass::SetActiveAssembly(name);
+}
+
+void vtkHaliteVolumeRepresentation::AddBlockSelector(const char* selector)
+{
+  this->Inner->Input.AddSelector(selector);
+  this->Superclass::AddBlockSelector(selector);
+}
+
+void vtkHaliteVolumeRepresentation::RemoveAllBlockSelectors()
+{
+  this->Inner->Input.ClearSelectors();
+  this->Superclass::RemoveAllBlockSelectors();
+}
+
+int vtkHaliteVolumeRepresentation::FillInputPortInformation(int port, vtkInformation* information)
+{
+  if (!this->Superclass::FillInputPortInformation(port, information))
+  {
+    return 0;
+  }
+  information->Append(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), "vtkStructuredGrid");
+  return 1;
+}
+
+int vtkHaliteVolumeRepresentation::RequestData(
+  vtkInformation* request, vtkInformationVector** inputs, vtkInformationVector* outputs)
+{
+  if (!this->GetHalite())
+  {
+    return this->Superclass::RequestData(request, inputs, outputs);
+  }
+  vtkMath::UninitializeBounds(this->DataBounds);
+  // A client of a server that renders has no input.
+  vtkDataObject* input =
+    inputs[0]->GetNumberOfInformationObjects() == 1 ? vtkDataObject::GetData(inputs[0], 0) : nullptr;
+  this->Inner->Grid = this->Inner->Input.Of(input);
+  if (input)
+  {
+    this->Inner->Grid->GetBounds(this->DataBounds);
+    if (this->UseSeparateOpacityArray)
+    {
+      this->AppendOpacityComponent(this->Inner->Grid);
+    }
+  }
+  // The superclass's would cut into tetrahedra.
+  return this->vtkVolumeRepresentation::RequestData(request, inputs, outputs);
+}
+
+int vtkHaliteVolumeRepresentation::ProcessViewRequest(
+  vtkInformationRequestKey* request, vtkInformation* inInfo, vtkInformation* outInfo)
+{
+  vtkHaliteMapper* mapper = this->GetHalite();
+  if (!mapper)
+  {
+    return this->Superclass::ProcessViewRequest(request, inInfo, outInfo);
+  }
+  if (!this->vtkVolumeRepresentation::ProcessViewRequest(request, inInfo, outInfo))
+  {
+    return 0;
+  }
+  if (request == vtkPVView::REQUEST_UPDATE())
+  {
+    outInfo->Set(vtkPVRenderView::NEED_ORDERED_COMPOSITING(), 1);
+    vtkPVRenderView::SetPiece(inInfo, this, this->Inner->Grid);
+    const int configuration = this->UseDataPartitions
+      ? vtkPVRenderView::USE_BOUNDS_FOR_REDISTRIBUTION
+      : vtkPVRenderView::DATA_IS_REDISTRIBUTABLE | vtkPVRenderView::USE_DATA_FOR_LOAD_BALANCING;
+    vtkPVRenderView::SetOrderedCompositingConfiguration(inInfo, this, configuration);
+    vtkPVRenderView::SetRedistributionModeToUniquelyAssignBoundaryCells(inInfo, this);
+    vtkPVRenderView::SetRequiresDistributedRendering(inInfo, this, true);
+    vtkNew<vtkMatrix4x4> placement;
+    this->Actor->GetMatrix(placement);
+    vtkPVRenderView::SetGeometryBounds(inInfo, this, this->DataBounds, placement);
+    this->Actor->SetMapper(nullptr);
+  }
+  else if (request == vtkPVView::REQUEST_UPDATE_LOD())
+  {
+    this->LODGeometryFilter->SetInputData(vtkPVView::GetPiece(inInfo, this));
+    this->LODGeometryFilter->SetUseOutline(inInfo->Has(vtkPVRenderView::USE_OUTLINE_FOR_LOD()) ? 1 : 0);
+    this->LODGeometryFilter->Update();
+    vtkPVRenderView::SetPieceLOD(inInfo, this, this->LODGeometryFilter->GetOutputDataObject(0));
+  }
+  else if (request == vtkPVView::REQUEST_RENDER())
+  {
+    this->UpdateMapperParameters();
+    this->Actor->SetEnableLOD(inInfo->Has(vtkPVRenderView::USE_LOD()) ? 1 : 0);
+    vtkAlgorithmOutput* delivered = vtkPVRenderView::GetPieceProducer(inInfo, this);
+    if (delivered && vtkDataSet::SafeDownCast(delivered->GetProducer()->GetOutputDataObject(0)))
+    {
+      mapper->SetInputConnection(delivered);
+    }
+    else
+    {
+      this->Actor->SetMapper(nullptr);
+    }
+    this->LODMapper->SetInputConnection(vtkPVRenderView::GetPieceProducerLOD(inInfo, this));
+  }
+  return 1;
+}
+
+void vtkHaliteVolumeRepresentation::PrintSelf(ostream& os, vtkIndent indent)
+{
+  this->Superclass::PrintSelf(os, indent);
+  os << indent << "Grid:\n";
+  this->Inner->Grid->PrintSelf(os, indent.GetNextIndent());
+}

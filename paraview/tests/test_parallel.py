@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Boxes in pieces on several ranks, or on a server: the pictures are those of one process.
+
+Run it under mpiexec for ranks; with a URL as argument it connects to a server there.
+"""
+import math
+import os
+import sys
+import tempfile
+
+import session
+
+from paraview import servermanager, simple
+from vtkmodules import vtkIOXML
+
+from boxes import NEAR, check, lattice
+from runner import main
+
+COLOR = [(0, 0.1, 0.4, 0.9), (0.5, 0.9, 0.9, 0.2), (1, 1, 0.2, 0.1)]
+OPACITY = [(0, 0.5), (0.3, 4), (0.5, 0), (1, 3)]
+ABOUT = {"color": COLOR, "opacity": OPACITY}
+
+
+def ranks():
+    return servermanager.ActiveConnection.GetNumberOfDataPartitions()
+
+
+def parts(folder, ends, axis=0, cells="hex"):
+    """A file that lists slabs of the unit box, between these places along an axis."""
+    names = []
+    for i, (a, b) in enumerate(zip(ends, ends[1:])):
+        low, high = [0, 0, 0], [1, 1, 1]
+        low[axis], high[axis] = a, b
+        w = vtkIOXML.vtkXMLUnstructuredGridWriter()
+        names.append(f"part{i}.vtu")
+        w.SetFileName(os.path.join(folder, names[-1]))
+        w.SetInputData(lattice(4, low, high, cells=cells))
+        w.Write()
+    path = os.path.join(folder, "parts.pvtu")
+    with open(path, "w") as f:
+        f.write('<VTKFile type="PUnstructuredGrid" version="1.0"><PUnstructuredGrid GhostLevel="0">'
+                '<PPoints><PDataArray type="Float64" NumberOfComponents="3"/></PPoints>'
+                '<PPointData Scalars="s"><PDataArray type="Float64" Name="s"/></PPointData>')
+        f.writelines(f'<Piece Source="{name}"/>' for name in names)
+        f.write("</PUnstructuredGrid></VTKFile>")
+    return simple.XMLPartitionedUnstructuredGridReader(FileName=[path])
+
+
+def drawn(ends, views=((2.1, -1.7, 2.9), (-1.5, 2.4, -1.9)), **how):
+    # ParaView blends the ranks' pictures as bytes, in pairs, and cuts off what is less.
+    near = NEAR + math.log2(ranks())
+    with tempfile.TemporaryDirectory() as folder:
+        v = session.view()
+        reader = parts(folder, ends, how.pop("axis", 0), how.pop("cells", "hex"))
+        partitions = how.pop("partitions", 0)
+        d = session.show(reader, v, color=COLOR, opacity=OPACITY, **how)
+        d.UseDataPartitions = partitions
+        for position in views:
+            v.CameraPosition = position
+            worst = check(session.picture(v), session.truth(v, **ABOUT), near=near, what=f"{ranks()} ranks, {ends}")
+            print(f"        {worst:.2f} of 255 apart")
+        if ranks() > 1 and not servermanager.ActiveConnection.IsRemote():
+            # This rank has a part of the cells, and draws that.
+            drawn_here = session.mapper_of(d).GetInputDataObject(0, 0).GetNumberOfCells()
+            assert 0 < drawn_here < 64 * (len(ends) - 1), drawn_here
+        simple.Delete(reader)
+        simple.Delete(v)
+
+
+def test_even_slabs():
+    drawn([0, 0.25, 0.5, 0.75, 1])
+
+
+def test_uneven_slabs():
+    drawn([0, 0.125, 0.25, 0.5, 1])
+
+
+def test_fewer_pieces_than_ranks():
+    drawn([0, 0.5, 1], axis=1)
+
+
+def test_partitions_as_they_are():
+    drawn([0, 0.125, 0.25, 0.5, 1], partitions=1)
+
+
+def test_a_rank_without_cells():
+    drawn([0, 0.5, 1], axis=1, partitions=1)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) > 1 and ":" in sys.argv[-1]:
+        host, port = sys.argv.pop().split(":")
+        simple.Connect(host, int(port))
+    session.load()
+    main(dict(globals()))
