@@ -1,11 +1,7 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""Boxes in pieces on several ranks, or on a server: the pictures are those of one process.
-
-Run it under mpiexec for ranks; with a URL as argument it connects to a server there.
-"""
+"""Boxes in pieces on several ranks, under mpiexec: the pictures are those of one process."""
 import math
 import os
-import sys
 import tempfile
 
 import session
@@ -46,7 +42,7 @@ def parts(folder, ends, axis=0, cells="hex"):
     return simple.XMLPartitionedUnstructuredGridReader(FileName=[path])
 
 
-def drawn(ends, views=((2.1, -1.7, 2.9), (-1.5, 2.4, -1.9)), **how):
+def drawn(ends, views=((2.1, -1.7, 2.9), (-1.5, 2.4, -1.9)), also=lambda v: None, **how):
     # ParaView blends the ranks' pictures as bytes, in pairs, and cuts off what is less.
     near = NEAR + math.log2(ranks())
     with tempfile.TemporaryDirectory() as folder:
@@ -58,6 +54,7 @@ def drawn(ends, views=((2.1, -1.7, 2.9), (-1.5, 2.4, -1.9)), **how):
         for position in views:
             v.CameraPosition = position
             worst = check(session.picture(v), session.truth(v, **ABOUT), near=near, what=f"{ranks()} ranks, {ends}")
+            also(v)
             print(f"        {worst:.2f} of 255 apart")
         if ranks() > 1 and not servermanager.ActiveConnection.IsRemote():
             # This rank has a part of the cells, and draws that.
@@ -88,8 +85,5 @@ def test_a_rank_without_cells():
 
 
 if __name__ == "__main__":
-    if len(sys.argv) > 1 and ":" in sys.argv[-1]:
-        host, port = sys.argv.pop().split(":")
-        simple.Connect(host, int(port))
     session.load()
     main(dict(globals()))
