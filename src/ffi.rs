@@ -8,6 +8,7 @@
 #![allow(unreachable_pub, unused_qualifications, reason = "cxx makes names of its own public, and says where they are")]
 
 mod grids;
+mod meshes;
 mod numbers;
 mod transfer;
 mod views;
@@ -20,11 +21,11 @@ use crate::image::{Backdrop, Image};
 use crate::integral::Choice;
 use crate::integral::choice::Form;
 use crate::memory;
-use crate::mesh::cells::name;
-use crate::mesh::{Array, Cells, Mesh, Polyhedra, Values};
-use bridge::{ArrayInfo, CellCount, FieldSpec, IntegralSpec, Numbers, Stats, TransferSpec, Type, ViewSpec};
-use glam::{DMat4, DVec3};
+use crate::mesh::{Array, Cells, Mesh, Polyhedra};
+use bridge::{FieldSpec, IntegralSpec, Numbers, Stats, TransferSpec, Type, ViewSpec};
+use glam::DMat4;
 use grids::{add_grid_array, new_grid, set_grid};
+use meshes::{array, array_values, arrays, cell_counts, connectivity, offsets, points, types};
 use numbers::{cast, indices, point_ids, triples, values};
 use std::path::Path;
 use transfer::transfer;
@@ -277,74 +278,6 @@ fn add_array(mesh: &mut Mesh, name: &str, of_cells: bool, components: usize, num
         let array = Array { name: name.into(), components, values: values(&numbers)? };
         if of_cells { mesh.add_cell_array(array) } else { mesh.add_point_array(array) }
     })
-}
-
-/// Arrays of points first, then those of cells.
-fn all_arrays(mesh: &Mesh) -> impl Iterator<Item = (bool, &Array)> {
-    mesh.point_arrays().iter().map(|a| (false, a)).chain(mesh.cell_arrays().iter().map(|a| (true, a)))
-}
-
-fn array(mesh: &Mesh, index: usize) -> Result<(bool, &Array)> {
-    all_arrays(mesh).nth(index).ok_or_else(|| Error::Field(format!("the mesh has no array {index}")))
-}
-
-fn arrays(mesh: &Mesh) -> Result<Vec<ArrayInfo>> {
-    let kind = |v: &Values| match v {
-        Values::I8(_) => Type::I8,
-        Values::U8(_) => Type::U8,
-        Values::I16(_) => Type::I16,
-        Values::U16(_) => Type::U16,
-        Values::I32(_) => Type::I32,
-        Values::U32(_) => Type::U32,
-        Values::I64(_) => Type::I64,
-        Values::U64(_) => Type::U64,
-        Values::F32(_) => Type::F32,
-        Values::F64(_) => Type::F64,
-    };
-    let info = |(of_cells, a): (bool, &Array)| ArrayInfo {
-        name: a.name.clone(),
-        of_cells,
-        kind: kind(&a.values),
-        components: a.components,
-        tuples: a.tuples(),
-    };
-    guard(|| Ok(all_arrays(mesh).map(info).collect()))
-}
-
-fn array_values(mesh: &Mesh, index: usize) -> Result<Vec<f64>> {
-    guard(|| {
-        let (_, array) = array(mesh, index)?;
-        memory::check_array::<f64>("the values of an array", array.values.len())?;
-        Ok((0..array.values.len()).map(|i| array.values.get(i)).collect())
-    })
-}
-
-fn cell_counts(mesh: &Mesh) -> Result<Vec<CellCount>> {
-    guard(|| {
-        let mut counts = [0; 256];
-        mesh.cells().types.iter().for_each(|&t| counts[usize::from(t)] += 1);
-        let count = |t: u8| CellCount { vtk_type: t, name: name(t).into(), count: counts[usize::from(t)] };
-        Ok((0..=255).map(count).filter(|c| c.count > 0).collect())
-    })
-}
-
-fn points(mesh: &Mesh) -> Result<Vec<f64>> {
-    guard(|| {
-        memory::check_array::<DVec3>("the points of a mesh", mesh.points().len())?;
-        Ok(mesh.points().iter().flat_map(DVec3::to_array).collect())
-    })
-}
-
-fn types(mesh: &Mesh) -> Result<Vec<u8>> {
-    guard(|| Ok(mesh.cells().types.clone()))
-}
-
-fn offsets(mesh: &Mesh) -> Result<Vec<u64>> {
-    guard(|| Ok(mesh.cells().offsets.clone()))
-}
-
-fn connectivity(mesh: &Mesh) -> Result<Vec<u32>> {
-    guard(|| Ok(mesh.cells().connectivity.clone()))
 }
 
 fn new_session(threads: usize, device: &str, engine: &str, log: &Log) -> Result<Box<Session>> {

@@ -16,6 +16,7 @@
 //! optical depth is at most 0.05, are one panel of two nodes, exact for degree 3, and off by less than 1e-5.
 
 mod closed;
+mod light;
 mod panel;
 
 use super::Light as Gathered;
