@@ -21,7 +21,7 @@ def ranks():
     return servermanager.ActiveConnection.GetNumberOfDataPartitions()
 
 
-def parts(folder, ends, axis=0, cells="hex"):
+def parts(folder, ends, axis=0, cells="hex", order=None):
     """A file that lists slabs of the unit box, between these places along an axis."""
     names = []
     for i, (a, b) in enumerate(zip(ends, ends[1:])):
@@ -37,7 +37,7 @@ def parts(folder, ends, axis=0, cells="hex"):
         f.write('<VTKFile type="PUnstructuredGrid" version="1.0"><PUnstructuredGrid GhostLevel="0">'
                 '<PPoints><PDataArray type="Float64" NumberOfComponents="3"/></PPoints>'
                 '<PPointData Scalars="s"><PDataArray type="Float64" Name="s"/></PPointData>')
-        f.writelines(f'<Piece Source="{name}"/>' for name in names)
+        f.writelines(f'<Piece Source="{names[i]}"/>' for i in order or range(len(names)))
         f.write("</PUnstructuredGrid></VTKFile>")
     return simple.XMLPartitionedUnstructuredGridReader(FileName=[path])
 
@@ -47,7 +47,7 @@ def drawn(ends, views=((2.1, -1.7, 2.9), (-1.5, 2.4, -1.9)), also=lambda v: None
     near = NEAR + math.log2(ranks())
     with tempfile.TemporaryDirectory() as folder:
         v = session.view()
-        reader = parts(folder, ends, how.pop("axis", 0), how.pop("cells", "hex"))
+        reader = parts(folder, ends, how.pop("axis", 0), how.pop("cells", "hex"), how.pop("order", None))
         partitions = how.pop("partitions", 0)
         d = session.show(reader, v, color=COLOR, opacity=OPACITY, **how)
         d.UseDataPartitions = partitions
@@ -74,6 +74,10 @@ def test_uneven_slabs():
 
 def test_fewer_pieces_than_ranks():
     drawn([0, 0.5, 1], axis=1)
+
+
+def test_interlocking_pieces_are_dealt_anew():
+    drawn([0, 0.25, 0.5, 0.75, 1], order=[0, 2, 1, 3])
 
 
 def test_partitions_as_they_are():
