@@ -230,16 +230,27 @@ impl TransferFunction {
 
 /// The piecewise linear function through `knots` at `s`, right-continuous at steps.
 pub(crate) fn interpolate<T>(knots: &[(f64, T)], s: f64, clamp: bool, value: impl Fn(&T) -> f64) -> f64 {
+    let [one] = interpolate_all(knots, s, clamp, |v| [value(v)]);
+    one
+}
+
+/// As [`interpolate`], for `K` functions with the same knots.
+pub(crate) fn interpolate_all<T, const K: usize>(
+    knots: &[(f64, T)],
+    s: f64,
+    clamp: bool,
+    value: impl Fn(&T) -> [f64; K],
+) -> [f64; K] {
     let above = knots.partition_point(|k| k.0 <= s);
     let last = knots.len() - 1;
     match above {
-        _ if !clamp && (s < knots[0].0 || s > knots[last].0) => 0.0,
+        _ if !clamp && (s < knots[0].0 || s > knots[last].0) => [0.0; K],
         0 => value(&knots[0].1),
         i if i > last => value(&knots[last].1),
         i => {
             let ((s0, a), (s1, b)) = (&knots[i - 1], &knots[i]);
-            let (a, b) = (value(a), value(b));
-            a + (b - a) * ((s - s0) / (s1 - s0))
+            let (a, b, share) = (value(a), value(b), (s - s0) / (s1 - s0));
+            std::array::from_fn(|k| a[k] + (b[k] - a[k]) * share)
         }
     }
 }

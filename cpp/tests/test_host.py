@@ -85,7 +85,8 @@ def test_progress_and_abort():
     v = volume(lattice(12, field=SLANT), WAVES, RAMP, NumberOfThreads=1)
     shares = []
     v.GetMapper().AddObserver("VolumeMapperRenderProgressEvent", lambda *_: shares.append(1))
-    w, r = scene(v, size=(500, 500))
+    # Large enough that the first report comes long before the end.
+    w, r = scene(v, size=(1600, 1200))
     w.Render()
     assert shares, "a large frame says how far it is"
     tag = w.AddObserver("AbortCheckEvent", lambda *_: w.SetAbortRender(1))

@@ -12,8 +12,8 @@
 //! - and the argument of the logarithm of the opacity convention changes by a factor of at most 2.
 //!
 //! The collocation is exact for integrands of degree 7, so in such panels it is off by less than 1e-6 of the piece; the
-//! number of panels follows the function, and is never fixed. Pieces in which a fifth of that changes at most, and whose
-//! optical depth is at most 0.05, are one panel of two nodes, exact for degree 3, and off by less than 1e-5.
+//! number of panels follows the function, and is never fixed. Pieces in which half of that changes at most, and whose
+//! optical depth is at most 0.3, are one panel of three nodes, exact for degree 5.
 
 mod closed;
 mod light;

@@ -5,17 +5,17 @@
 //! Runge–Kutta Processes, 1964), which for this system takes no iteration.
 
 use super::light::{ANGLES, angle, cone_sides, power};
-use super::{Bounded, Gathered, Ready, Scratch, Second, Segment, closed};
+use super::{Bounded, Gathered, Ready, Scratch, Second, Segment, Table, closed};
 use crate::transfer::shading::Origin;
-use crate::transfer::{Convention, bivariate::Shape, interpolate};
+use crate::transfer::{Convention, bivariate::Shape, interpolate, interpolate_all};
 use glam::DVec3;
 
 /// Nodes of a panel.
 const NODES: usize = 4;
-/// The share of what may change in a panel up to which two nodes are enough: they are exact for degree 3.
-const EASY: f64 = 0.2;
-/// The greatest depth of a panel of two nodes.
-const SHALLOW: f64 = 0.05;
+/// The share of what may change in a panel up to which three nodes are enough: they are exact for degree 5.
+const EASY: f64 = 0.5;
+/// The greatest depth of a panel of three nodes.
+const SHALLOW: f64 = 0.3;
 /// The greatest depth of a panel.
 const DEEPEST: f64 = 1.5;
 /// By how many σ a Gaussian's argument moves in a panel, and by how many radians a sinusoid's, at most.
@@ -77,10 +77,10 @@ impl<const N: usize> Rule<N> {
     }
 }
 
-/// The rules of two and of four nodes.
+/// The rules of three and of four nodes.
 #[derive(Debug, Clone)]
 pub(super) struct Rules {
-    two: Rule<2>,
+    three: Rule<3>,
     four: Rule<NODES>,
 }
 
@@ -89,8 +89,9 @@ impl Default for Rules {
         let root = |sign: f64| (3.0 / 7.0 + sign * 2.0 / 7.0 * 1.2_f64.sqrt()).sqrt();
         let nodes = [-root(1.0), -root(-1.0), root(-1.0), root(1.0)].map(|x| 0.5 + 0.5 * x);
         let weights = [-1.0, 1.0, 1.0, -1.0].map(|sign: f64| (18.0 + sign * 30_f64.sqrt()) / 72.0);
-        let two = [-1.0, 1.0].map(|sign: f64| 0.5 + sign / 12_f64.sqrt());
-        Rules { two: Rule::new(two, [0.5; 2]), four: Rule::new(nodes, weights) }
+        let three = [-1.0, 0.0, 1.0].map(|sign: f64| 0.5 + sign * 0.15_f64.sqrt());
+        let three = Rule::new(three, [5.0, 8.0, 5.0].map(|w| w / 18.0));
+        Rules { three, four: Rule::new(nodes, weights) }
     }
 }
 
@@ -130,6 +131,22 @@ fn pass_whole(at: f64, rise: f64, [least, most]: [f64; 2], u: f64) -> f64 {
         return f64::INFINITY;
     };
     if (least..=most).contains(&next) { pass(at, rise, next, u) } else { f64::INFINITY }
+}
+
+/// Where beyond `u` a segment next passes a line between the texels of a table.
+///
+/// Not inlined: what is no table would be divided as if it were one ahead of the decision, and its bits are denormal numbers.
+#[inline(never)]
+fn next_texel(table: &Table, segment: &Segment, u: f64) -> f64 {
+    let (first, last) = (table.place(segment.at), table.place(segment.values(1.0)));
+    let next = |k: usize| pass_whole(first[k], last[k] - first[k], [0.0, table.size()[k] as f64 - 1.0], u);
+    next(0).min(next(1))
+}
+
+/// What a table has at (s, g); not inlined, as [`next_texel`].
+#[inline(never)]
+fn texel(table: &Table, at: [f64; 2]) -> [f64; 4] {
+    table.at(at)
 }
 
 /// Where beyond `u` it next passes a knot.
@@ -173,11 +190,7 @@ impl Second {
                 }
             }
             Ready::Table(table) => {
-                let (first, last) = (table.place(at), table.place(segment.values(1.0)));
-                for k in 0..2 {
-                    let most = table.size()[k] as f64 - 1.0;
-                    next = next.min(pass_whole(first[k], last[k] - first[k], [0.0, most], u));
-                }
+                next = next.min(next_texel(table, segment, u));
             }
             Ready::Scalar { color, opacity, .. } => {
                 next = next.min(pass_knot(color, at[0], rise[0], u)).min(pass_knot(opacity, at[0], rise[0], u));
@@ -210,24 +223,22 @@ impl Second {
     /// What is linear between two such places.
     fn piece<'a>(&self, segment: &Segment, ends: [f64; 2], active: &'a [usize]) -> Piece<'a> {
         // From places inside: at the ends is what either side has.
-        let outward = |f: &dyn Fn([f64; 2]) -> f64| {
-            let [p, q] = [0.25, 0.75].map(|x| f(segment.values(ends[0] + (ends[1] - ends[0]) * x)));
-            [p - (q - p) * 0.5, q + (q - p) * 0.5].map(|x| x.max(0.0))
-        };
+        let inside = [0.25, 0.75].map(|x| segment.values(ends[0] + (ends[1] - ends[0]) * x));
+        let outward = |[p, q]: [f64; 2]| [p - (q - p) * 0.5, q + (q - p) * 0.5].map(|x| x.max(0.0));
         let mut knots = [[0.0; 4]; 2];
         if let Ready::Scalar { color, opacity, clamp } = &self.source {
+            let all = inside.map(|[s, _]| {
+                let [r, g, b] = interpolate_all(color, s, *clamp, |c| *c);
+                [r, g, b, interpolate(opacity, s, *clamp, |a| *a)]
+            });
             for k in 0..4 {
-                let values = outward(&|[s, _]| match k {
-                    3 => interpolate(opacity, s, *clamp, |a| *a),
-                    _ => interpolate(color, s, *clamp, |c| c[k]),
-                });
-                (knots[0][k], knots[1][k]) = (values[0], values[1]);
+                [knots[0][k], knots[1][k]] = outward([all[0][k], all[1][k]]);
             }
         }
         let factor = if self.factor.is_empty() {
             [1.0; 2]
         } else {
-            outward(&|[_, g]| interpolate(&self.factor, g, true, |h| *h))
+            outward(inside.map(|[_, g]| interpolate(&self.factor, g, true, |h| *h)))
         };
         let clear = matches!(self.source, Ready::Scalar { .. }) && knots[0][3] == 0.0 && knots[1][3] == 0.0;
         Piece { ends, knots, factor, active, clear: clear || factor == [0.0; 2] }
@@ -278,9 +289,9 @@ impl Second {
         count
     }
 
-    /// Adds all of a piece as one panel of two nodes, if little enough changes in it; else nothing, and says so.
+    /// Adds all of a piece as one panel of three nodes, if little enough changes in it; else nothing, and says so.
     fn add_easy(&self, segment: &Segment, piece: &Piece, light: &mut Gathered<f64>) -> bool {
-        let ([begin, end], rule) = (piece.ends, &self.rules.two);
+        let ([begin, end], rule) = (piece.ends, &self.rules.three);
         let h = end - begin;
         if !self.is_evenly_lit(segment, begin, h, EASY) {
             return false;
@@ -355,7 +366,7 @@ impl Second {
                 }
             }
             Ready::Table(table) => {
-                let [r, g, b, a] = table.at(segment.values(u));
+                let [r, g, b, a] = texel(table, segment.values(u));
                 add(DVec3::new(r, g, b), a);
             }
             Ready::Scalar { .. } => {
