@@ -43,6 +43,9 @@ use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::Instant;
 use tables::{Key, Tables};
 
+/// The most threads of a renderer: more take minutes to start, and gain nothing.
+pub const MOST_THREADS: usize = 4096;
+
 /// Draws one mesh, as often as wanted; keeps what did not change between frames.
 #[derive(Debug)]
 pub struct Renderer {
@@ -88,7 +91,7 @@ impl Renderer {
     /// A renderer on `threads` threads of its own and the chosen device.
     ///
     /// # Errors
-    /// [`Error::Render`] if the threads cannot be started; [`Error::Device`] if the device is none of this machine's,
+    /// [`Error::Render`] if the threads cannot be started, or are more than [`MOST_THREADS`]; [`Error::Device`] if the device is none of this machine's,
     /// or cannot be used. With [`DeviceChoice::Auto`] the CPU draws then.
     pub fn with_device(threads: usize, choice: DeviceChoice) -> Result<Self> {
         Self::with_engine(threads, choice, Engine::Auto)
@@ -100,6 +103,9 @@ impl Renderer {
     /// As [`Self::with_device`]; and [`Error::Device`] if the engine is [`Engine::Project`] and there is no graphics
     /// device.
     pub fn with_engine(threads: usize, choice: DeviceChoice, engine: Engine) -> Result<Self> {
+        if threads > MOST_THREADS {
+            return Err(Error::Render(format!("there are {MOST_THREADS} threads at most, and not {threads}")));
+        }
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .thread_name(|i| format!("halite-{i}"))

@@ -1,19 +1,16 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-// The face that halite.h shows, made of the bridge. Nothing of the bridge is visible from outside.
-#include "halite.h"
-
-// rust::Error is not in the header of the bridge.
-#include "rust/cxx.h"
-
-#include "halite/src/ffi.rs.h"
+// Renderers and pictures of halite.h, made of the bridge. Nothing of the bridge is visible from outside.
+#include "bridged.h"
 
 #include <atomic>
-#include <cstdint>
 #include <cstdlib>
 #include <mutex>
 
 namespace halite
 {
+
+using namespace bridged;
+
 namespace
 {
 
@@ -29,113 +26,6 @@ __attribute__((constructor)) void hushMesa()
 }
 #endif
 
-Level levelOf(const std::string& line)
-{
-  if (line.compare(0, 4, "INFO") == 0)
-  {
-    return Level::Info;
-  }
-  return line.compare(0, 5, "ERROR") == 0 ? Level::Error : Level::Warning;
-}
-
-// Gives a sink the lines that were collected for it.
-void drain(const bridge::Log& lines, const Log& sink)
-{
-  if (!sink)
-  {
-    return;
-  }
-  try
-  {
-    for (const rust::String& raw : bridge::take_lines(lines))
-    {
-      const std::string line(raw.data(), raw.size());
-      const std::size_t space = line.find(' ');
-      sink(levelOf(line), space == std::string::npos ? line : line.substr(space + 1));
-    }
-  }
-  catch (...)
-  {
-    // A log that cannot be written is no reason to fail.
-  }
-}
-
-// Runs a call of the bridge: its errors become ours.
-template <class Work>
-auto call(Work work) -> decltype(work())
-{
-  try
-  {
-    return work();
-  }
-  catch (const rust::Error& error)
-  {
-    throw Error(error.what());
-  }
-}
-
-// The same; what it logged is handed on, whether it failed or not, when `work` is gone.
-template <class Work>
-auto call(const bridge::Log& lines, const Log& sink, Work&& work) -> decltype(work())
-{
-  struct Drain
-  {
-    const bridge::Log& Lines;
-    const Log& Sink;
-    ~Drain() { drain(this->Lines, this->Sink); }
-  } drain{ lines, sink };
-  return call(std::forward<Work>(work));
-}
-
-std::size_t sizeOf(Type type)
-{
-  static const std::size_t sizes[] = { 1, 1, 2, 2, 4, 4, 8, 8, 4, 8 };
-  const auto index = static_cast<std::size_t>(type);
-  if (index >= sizeof sizes / sizeof *sizes)
-  {
-    throw Error("there is no type of numbers " + std::to_string(index));
-  }
-  return sizes[index];
-}
-
-// Whether so many numbers can lie there.
-void check(const char* what, const void* data, std::size_t count, std::size_t size)
-{
-  if (count == 0)
-  {
-    return;
-  }
-  if (!data)
-  {
-    throw Error(std::string(what) + ": " + std::to_string(count) + " numbers at a null pointer");
-  }
-  if (count > static_cast<std::size_t>(PTRDIFF_MAX) / size)
-  {
-    throw Error(std::string(what) + ": " + std::to_string(count) + " numbers are more than memory has room for");
-  }
-  if (reinterpret_cast<std::uintptr_t>(data) % size != 0)
-  {
-    throw Error(
-      std::string(what) + ": numbers of " + std::to_string(size) + " bytes at an address that is no multiple of that");
-  }
-}
-
-template <class T>
-rust::Slice<const T> slice(const char* what, const T* data, std::size_t count)
-{
-  // An empty slice must not be null either.
-  static const T none{};
-  check(what, data, count, sizeof(T));
-  return { count ? data : &none, count };
-}
-
-bridge::Numbers numbers(const char* what, const Numbers& n)
-{
-  const std::size_t size = sizeOf(n.type);
-  check(what, n.data, n.count, size);
-  return { static_cast<bridge::Type>(n.type), slice(what, static_cast<const std::uint8_t*>(n.data), n.count * size) };
-}
-
 // Four numbers for each of so many pixels.
 std::size_t sizeOfImage(std::uint32_t width, std::uint32_t height)
 {
@@ -148,20 +38,9 @@ std::size_t sizeOfImage(std::uint32_t width, std::uint32_t height)
   return 4 * pixels;
 }
 
-rust::Str str(const std::string& s)
-{
-  return { s.data(), s.size() };
-}
-
 std::array<double, 16> orIdentity(const Renderer::Matrix* matrix)
 {
   return matrix ? *matrix : std::array<double, 16>{ 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1 };
-}
-
-template <class T>
-std::vector<T> copy(const rust::Vec<T>& v)
-{
-  return std::vector<T>(v.begin(), v.end());
 }
 
 }
@@ -171,139 +50,6 @@ Error::~Error() = default;
 const char* version()
 {
   return HALITE_VERSION;
-}
-
-struct Mesh::Inner
-{
-  rust::Box<bridge::Mesh> Box;
-
-  // The mesh of a face that still has one.
-  static bridge::Mesh& Of(const Mesh& mesh)
-  {
-    if (!mesh.Data)
-    {
-      throw Error("this mesh was moved elsewhere");
-    }
-    return *mesh.Data->Box;
-  }
-};
-
-Mesh Mesh::open(const std::string& path, const Log& log)
-{
-  Mesh mesh(Numbers(), Numbers(nullptr, 0, Type::UInt8), std::vector<std::int64_t>{ 0 }, std::vector<std::int64_t>{});
-  const rust::Box<bridge::Log> lines = call([] { return bridge::new_log(); });
-  mesh.Data->Box = call(*lines, log, [&] { return bridge::open_mesh(str(path), 0, *lines); });
-  return mesh;
-}
-
-Mesh::Mesh(Numbers points, Numbers types, Numbers offsets, Numbers connectivity)
-{
-  if (types.type != Type::UInt8)
-  {
-    throw Error("cell types are bytes");
-  }
-  this->Data.reset(new Inner{ call([&] {
-    return bridge::new_mesh(numbers("points", points), numbers("cell types", types).bytes, numbers("offsets", offsets),
-      numbers("connectivity", connectivity));
-  }) });
-}
-
-Mesh::Mesh(Mesh&&) noexcept = default;
-Mesh& Mesh::operator=(Mesh&&) noexcept = default;
-Mesh::~Mesh() = default;
-
-void Mesh::addPolyhedra(Numbers cells, Numbers faces, Numbers points)
-{
-  call([&] {
-    bridge::add_polyhedra(Inner::Of(*this), numbers("starts of cells", cells), numbers("starts of faces", faces),
-      numbers("points of faces", points));
-  });
-}
-
-void Mesh::addArray(const std::string& name, Association association, std::size_t components, Numbers n)
-{
-  call([&] {
-    bridge::add_array(
-      Inner::Of(*this), str(name), association == Association::Cells, components, numbers(name.c_str(), n));
-  });
-}
-
-struct Grid::Inner
-{
-  rust::Box<bridge::Grid> Box;
-
-  static bridge::Grid& Of(const Grid& grid)
-  {
-    if (!grid.Data)
-    {
-      throw Error("this grid was moved elsewhere");
-    }
-    return *grid.Data->Box;
-  }
-};
-
-Grid::Grid(Numbers x, Numbers y, Numbers z, const std::array<double, 3>& origin, const std::array<double, 9>& direction)
-{
-  this->Data.reset(new Inner{
-    call([&] { return bridge::new_grid(numbers("x", x), numbers("y", y), numbers("z", z), origin, direction); }) });
-}
-
-Grid::Grid(Grid&&) noexcept = default;
-Grid& Grid::operator=(Grid&&) noexcept = default;
-Grid::~Grid() = default;
-
-void Grid::addArray(const std::string& name, Association association, std::size_t components, Numbers n)
-{
-  call([&] {
-    bridge::add_grid_array(
-      Inner::Of(*this), str(name), association == Association::Cells, components, numbers(name.c_str(), n));
-  });
-}
-
-std::vector<ArrayInfo> Mesh::arrays() const
-{
-  std::vector<ArrayInfo> result;
-  for (const bridge::ArrayInfo& a : call([&] { return bridge::arrays(Inner::Of(*this)); }))
-  {
-    result.push_back({ std::string(a.name), a.of_cells ? Association::Cells : Association::Points,
-      static_cast<Type>(a.kind), a.components, a.tuples });
-  }
-  return result;
-}
-
-std::vector<double> Mesh::arrayValues(std::size_t index) const
-{
-  return call([&] { return copy(bridge::array_values(Inner::Of(*this), index)); });
-}
-
-std::vector<CellCount> Mesh::cellCounts() const
-{
-  std::vector<CellCount> result;
-  for (const bridge::CellCount& c : call([&] { return bridge::cell_counts(Inner::Of(*this)); }))
-  {
-    result.push_back({ c.vtk_type, std::string(c.name), c.count });
-  }
-  return result;
-}
-
-std::vector<double> Mesh::points() const
-{
-  return call([&] { return copy(bridge::points(Inner::Of(*this))); });
-}
-
-std::vector<std::uint8_t> Mesh::types() const
-{
-  return call([&] { return copy(bridge::types(Inner::Of(*this))); });
-}
-
-std::vector<std::uint64_t> Mesh::offsets() const
-{
-  return call([&] { return copy(bridge::offsets(Inner::Of(*this))); });
-}
-
-std::vector<std::uint32_t> Mesh::connectivity() const
-{
-  return call([&] { return copy(bridge::connectivity(Inner::Of(*this))); });
 }
 
 struct Renderer::Inner

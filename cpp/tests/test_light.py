@@ -168,8 +168,13 @@ def test_functions_of_two_variables():
     expect(v, "by another array", **one, factor=lambda p: texel(p)[..., 3], lit=lambda rgb, p, along: texel(p)[..., :3])
     v.GetMapper().SetTransfer2DYAxisArray("nothing")
     said = messages(v.GetMapper())
-    pixels(scene(v, size=SIZE)[0])
+    w, r = scene(v, size=SIZE)
+    pixels(w)
     assert len(said) == 1 and "nothing" in said[0], said
+    # What is not in use refuses nothing.
+    v.GetProperty().SetTransferFunctionMode(v.GetProperty().TF_1D)
+    check(pixels(w), truth(r, SIZE, **LOOK), what="one variable")
+    assert len(said) == 1, said
 
 
 def test_silhouettes_and_widgets():

@@ -113,16 +113,14 @@ halite::Table2D TableOf(vtkImageData* image, vtkDataArray* array, vtkDataArray* 
 
 Shading::Shading(vtkVolumeProperty* property, vtkRenderer* renderer, vtkDataArray* array, vtkDataArray* second)
 {
-  // With 2D functions, VTK says that there is gradient opacity.
-  if (property->GetTransferFunctionMode() == vtkVolumeProperty::TF_2D)
+  const bool isTable = property->GetTransferFunctionMode() == vtkVolumeProperty::TF_2D;
+  if (isTable && IsOfTwo(property))
   {
-    if (vtkImageData* function = property->GetTransferFunction2D(0))
-    {
-      this->Table = TableOf(function, array, second);
-      this->TableTime = static_cast<std::uint64_t>(function->GetMTime());
-    }
+    vtkImageData* function = property->GetTransferFunction2D(0);
+    this->Table = TableOf(function, array, second);
+    this->TableTime = static_cast<std::uint64_t>(function->GetMTime());
   }
-  else if (property->HasGradientOpacity(0) && !property->GetDisableGradientOpacity(0))
+  else if (IsOfTwo(property))
   {
     for (const auto& k : Functions::KnotsOf(property->GetGradientOpacity(0)))
     {
@@ -145,6 +143,14 @@ Shading::Shading(vtkVolumeProperty* property, vtkRenderer* renderer, vtkDataArra
   {
     this->Second = second;
   }
+}
+
+bool Shading::IsOfTwo(vtkVolumeProperty* property)
+{
+  // With 2D functions, VTK says that there is gradient opacity.
+  return property->GetTransferFunctionMode() == vtkVolumeProperty::TF_2D
+    ? property->GetTransferFunction2D(0) != nullptr
+    : property->HasGradientOpacity(0) && !property->GetDisableGradientOpacity(0);
 }
 
 bool Shading::IsThere() const

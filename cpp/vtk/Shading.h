@@ -30,6 +30,8 @@ struct Shading
   // What a property asks for where `array` is drawn, lit by the lights of `renderer`.
   Shading(vtkVolumeProperty* property, vtkRenderer* renderer, vtkDataArray* array, vtkDataArray* second);
 
+  // Whether functions of a property have a second variable.
+  static bool IsOfTwo(vtkVolumeProperty* property);
   // Whether there is anything of it.
   bool IsThere() const;
   // Whether it needs the gradient of the field.

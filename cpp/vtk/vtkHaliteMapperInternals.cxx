@@ -115,9 +115,15 @@ void vtkHaliteMapper::Internals::WarnOfUnsupported()
 
 void vtkHaliteMapper::Internals::Shade(Content& content, vtkVolume* volume, vtkRenderer* renderer, bool isMaximum)
 {
+  // A maximum has neither.
+  if (isMaximum)
+  {
+    return;
+  }
+  vtkVolumeProperty* property = volume->GetProperty();
   const std::string name = Text(this->Self.Transfer2DYAxisArray);
   vtkDataArray* second = nullptr;
-  if (!name.empty())
+  if (!name.empty() && (!this->Self.Widgets.empty() || Shading::IsOfTwo(property)))
   {
     vtkDataSetAttributes* arrays = content.Association == halite::Association::Points
       ? static_cast<vtkDataSetAttributes*>(content.Grid->GetPointData())
@@ -128,7 +134,6 @@ void vtkHaliteMapper::Internals::Shade(Content& content, vtkVolume* volume, vtkR
       throw halite::Error("Transfer2DYAxisArray: there is no array \"" + name + "\" beside the one that is drawn");
     }
   }
-  vtkVolumeProperty* property = volume->GetProperty();
   if (property->GetTransferFunctionMode() == vtkVolumeProperty::TF_2D && !property->GetTransferFunction2D(0))
   {
     this->WarnOnce("the property has no 2D transfer function: its functions of one variable are used");
@@ -144,7 +149,7 @@ void vtkHaliteMapper::Internals::Shade(Content& content, vtkVolume* volume, vtkR
     shading.Table.reset();
     shading.Second = second;
   }
-  if (!shading.IsThere() || isMaximum)
+  if (!shading.IsThere())
   {
     return;
   }

@@ -3,6 +3,7 @@
 use glam::DVec3;
 use halite::field::Component;
 use halite::io::Time;
+use halite::render::MOST_THREADS;
 use halite::scene::automatic::{Opacity, Place};
 use halite::transfer::shading::Shade;
 use halite::view::ClippingPlane;
@@ -38,9 +39,6 @@ pub(crate) fn factors(text: &str) -> Result<DVec3, String> {
 pub(crate) fn count(text: &str) -> Result<usize, String> {
     text.trim().parse().map_err(|_| "it is a whole number from 0".into())
 }
-
-/// Threads that one machine may have; more take minutes to start, and gain nothing.
-const MOST_THREADS: usize = 4096;
 
 /// A number of threads, 0 for one for each core.
 pub(crate) fn threads(text: &str) -> Result<usize, String> {
