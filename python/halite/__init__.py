@@ -55,6 +55,13 @@ def _arrays(data):
     return [(str(name), np.ascontiguousarray(values)) for name, values in (data or {}).items()]
 
 
+def _whole(what, numbers):
+    numbers = np.asarray(numbers).reshape(-1)
+    if numbers.size and not np.issubdtype(numbers.dtype, np.integer):
+        raise Error(f"{what} are whole numbers, and not {numbers.dtype}")
+    return np.ascontiguousarray(numbers, np.int64)
+
+
 class Mesh:
     """A mesh, or a regular or rectilinear grid, with its arrays. It never changes.
 
@@ -92,10 +99,12 @@ class Mesh:
         points = np.ascontiguousarray(points, np.float64)
         if points.ndim != 2:
             raise Error(f"points have {points.ndim} dimensions, and not the shape (n, 3)")
-        flat = lambda a: np.ascontiguousarray(a, np.int64).reshape(-1)
-        return cls(_halite.Mesh.from_arrays(
-            points, flat(cells), flat(offsets), np.ascontiguousarray(types, np.uint8).reshape(-1),
-            None if faces is None else [flat(a) for a in faces], _arrays(point_data), _arrays(cell_data)))
+        kinds = _whole("types", types)
+        if kinds.size and not 0 <= kinds.min() <= kinds.max() <= 255:
+            raise Error(f"types are VTK's, from 0 to 255, and not {kinds.min()} to {kinds.max()}")
+        faces = None if faces is None else [_whole("faces", a) for a in faces]
+        return cls(_halite.Mesh.from_arrays(points, _whole("cells", cells), _whole("offsets", offsets), kinds.astype(np.uint8),
+                                            faces, _arrays(point_data), _arrays(cell_data)))
 
     @classmethod
     def image(cls, dimensions, *, origin=(0, 0, 0), spacing=(1, 1, 1), direction=np.eye(3), extent_start=(0, 0, 0),
@@ -137,14 +146,18 @@ class Mesh:
 
     @property
     def bounds(self):
-        """Least and greatest x, y and z, in the order of VTK: (xmin, xmax, ymin, ymax, zmin, zmax)."""
-        return tuple(self._core.bounds)
+        """Least and greatest x, y and z, in the order of VTK: (xmin, xmax, ymin, ymax, zmin, zmax).
+
+        As in VTK, they are (1, -1, 1, -1, 1, -1) where there is no finite point.
+        """
+        bounds = tuple(self._core.bounds)
+        return bounds if np.isfinite(bounds).all() else (1.0, -1.0) * 3
 
     @property
     def length(self):
-        """The length of the diagonal of the bounds."""
+        """The length of the diagonal of the bounds; 0 where there is no finite point."""
         b = np.reshape(self.bounds, (3, 2))
-        return float(np.linalg.norm(b[:, 1] - b[:, 0]))
+        return float(np.linalg.norm(np.maximum(b[:, 1] - b[:, 0], 0)))
 
     @property
     def arrays(self):
@@ -348,7 +361,7 @@ class Renderer:
         if transfer is None:
             low, high = self._range
             transfer = TransferFunction("viridis", (low, high if high > low else low + 1), opacity=[0, 1],
-                                        unit_distance=max(self.mesh.length, 1e-300) / 5)
+                                        unit_distance=(self.mesh.length or 1.0) / 5)
         self._core.set_transfer(transfer._core)
 
     def render(self, view, depth=None, *, maximum=False, progress=None):

@@ -165,8 +165,7 @@ class Volume(vtkVolume):
             return
         what = {"association": self.association, "component": self.component}
         if shape == self._shape and values is not None:
-            arrays = grid.GetCellData() if self._of_cells else grid.GetPointData()
-            what["association"] = "cell" if arrays is grid.GetCellData() else "point"
+            what["association"] = "cell" if self._of_cells else "point"
             self._renderer.set_scalars(vtk_to_numpy(values), **what)
         else:
             mesh = Mesh.from_vtk(grid)

@@ -4,6 +4,7 @@ use crate::{Error, raised};
 use glam::{DMat3, DVec3};
 use halite::grid::{Grid, Lattice};
 use halite::io::{DataSet, Source, Time};
+use halite::memory;
 use halite::mesh::{Array, Arrays, Cells, Polyhedra, Values};
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -44,7 +45,7 @@ impl Mesh {
         cell_data: Vec<Given<'_>>,
     ) -> PyResult<Self> {
         let cells = Cells {
-            types: types.as_slice()?.to_vec(),
+            types: memory::copied("types of cells", types.as_slice()?).map_err(raised)?,
             offsets: counts("offsets", &offsets)?,
             connectivity: indices(&connectivity)?,
         };
@@ -173,17 +174,34 @@ fn triples(points: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<DVec3>> {
         let [n, k] = [points.shape()[0], points.shape()[1]];
         return Err(Error::new_err(format!("points have the shape ({n}, {k}), and not (n, 3)")));
     }
-    Ok(points.as_slice()?.as_chunks().0.iter().map(|&p| DVec3::from_array(p)).collect())
+    let given = points.as_slice()?.as_chunks().0;
+    let mut points = vec![];
+    memory::reserve("points", &mut points, given.len()).map_err(raised)?;
+    points.extend(given.iter().map(|&p| DVec3::from_array(p)));
+    Ok(points)
 }
 
 fn counts(what: &str, numbers: &PyReadonlyArray1<'_, i64>) -> PyResult<Vec<u64>> {
-    let one = |&n: &i64| u64::try_from(n).map_err(|_| Error::new_err(format!("{what}: {n} is negative")));
-    numbers.as_slice()?.iter().map(one).collect()
+    whole(what, numbers, |n| format!("{what}: {n} is negative"))
 }
 
 fn indices(numbers: &PyReadonlyArray1<'_, i64>) -> PyResult<Vec<u32>> {
-    let one = |&n: &i64| u32::try_from(n).map_err(|_| Error::new_err(format!("{n} is the number of no point")));
-    numbers.as_slice()?.iter().map(one).collect()
+    whole("points of cells", numbers, |n| format!("{n} is the number of no point"))
+}
+
+/// Numbers in another type, which has room for all of them.
+fn whole<T: TryFrom<i64>>(
+    what: &str,
+    numbers: &PyReadonlyArray1<'_, i64>,
+    wrong: impl Fn(i64) -> String,
+) -> PyResult<Vec<T>> {
+    let given = numbers.as_slice()?;
+    let mut whole = vec![];
+    memory::reserve(what, &mut whole, given.len()).map_err(raised)?;
+    for &n in given {
+        whole.push(T::try_from(n).map_err(|_| Error::new_err(wrong(n)))?);
+    }
+    Ok(whole)
 }
 
 fn arrays(given: Vec<Given<'_>>) -> PyResult<Vec<Array>> {
@@ -196,7 +214,12 @@ pub(crate) fn array(name: String, given: &Bound<'_, PyAny>) -> PyResult<Array> {
         ($($type:ty => $variant:ident),*) => {
             $(if let Ok(array) = given.cast::<PyArrayDyn<$type>>() {
                 let components = array.shape().get(1..).map_or(1, |s| s.iter().product());
-                return Ok(Array { name, components, values: Values::$variant(array.readonly().as_slice()?.to_vec()) });
+                if components == 0 {
+                    return Err(Error::new_err(format!("the array \"{name}\" has no components")));
+                }
+                let values = array.try_readonly()?;
+                let values = memory::copied(format!("the array \"{name}\""), values.as_slice()?).map_err(raised)?;
+                return Ok(Array { name, components, values: Values::$variant(values) });
             })*
         };
     }

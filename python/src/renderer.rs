@@ -143,8 +143,7 @@ impl Renderer {
             return Err(thrown);
         }
         let Some(image) = image? else { return Ok(None) };
-        let flat = image.pixels.as_flattened().to_vec().into_pyarray(py);
-        flat.reshape([h, w, 4]).map(Some)
+        image.pixels.into_flattened().into_pyarray(py).reshape([h, w, 4]).map(Some)
     }
 
     #[getter]

@@ -60,6 +60,19 @@ def test_what_is_wrong_is_named():
         halite.Mesh.from_arrays(points[:, :2], cells, offsets, types)
     with pytest.raises(halite.Error, match="26"):
         halite.Mesh.from_arrays(points, cells, offsets, types, point_data={"s": np.zeros(26)})
+    with pytest.raises(halite.Error, match="300"):
+        halite.Mesh.from_arrays(points, cells, offsets, np.full(8, 300))
+    with pytest.raises(halite.Error, match="float64"):
+        halite.Mesh.from_arrays(points, cells + 0.5, offsets, types)
+    with pytest.raises(halite.Error, match="no components"):
+        halite.Mesh.from_arrays(points, cells, offsets, types, point_data={"s": np.zeros((27, 0))})
+    with pytest.raises(halite.Error, match="4096"):
+        halite.Renderer(halite.Mesh.from_arrays(points, cells, offsets, types, point_data={"s": points[:, 0]}), threads=10**6)
+    empty = halite.Mesh.from_arrays(np.zeros((0, 3)), [], [0], [], point_data={"s": np.zeros(0)})
+    assert empty.bounds == (1, -1, 1, -1, 1, -1) and empty.length == 0
+    assert halite.Renderer(empty).render(halite.View((3, 2, 4), size=(8, 8))).max() == 0
+    with pytest.raises(halite.Error, match="no array"):
+        halite.show(halite.Mesh.from_arrays(points, cells, offsets, types))
     with pytest.raises(OSError):
         halite.read("nowhere.vtu")
     with pytest.raises(halite.Error, match="no colour map|nothing"):
