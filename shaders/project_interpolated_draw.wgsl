@@ -1,7 +1,7 @@
 // Drawing by interpolation: the words and values are those of project_interpolated.wgsl.
 
 @fragment
-fn fragment(drawn: Drawn) -> @location(0) vec4f {
+fn fragment(drawn: Drawn) -> Fragment {
     let words = words_of(drawn);
     let values = values_in(words);
     cell_plane = words[3].y;
@@ -44,5 +44,5 @@ fn fragment(drawn: Drawn) -> @location(0) vec4f {
     front = select(front + rise * (start / length), front, start == 0.0);
     // Lines count values from the cell's least.
     let least = select(Value(), values[0], COLORING == EXACT && LINES > 0u);
-    return quantised(colored(front - least, back - least, end - start, words), at, u32(words[3].x));
+    return fragment_of(front - least, back - least, end - start, words, at, u32(words[3].x));
 }

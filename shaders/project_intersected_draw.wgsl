@@ -8,7 +8,7 @@ fn nearness_at(t: vec2f, stretch: f32, depth: f32) -> vec2f {
 
 /// Reads no uniforms unless something cuts rays off: in software each takes as long as a look-up.
 @fragment
-fn fragment(drawn: Drawn) -> @location(0) vec4f {
+fn fragment(drawn: Drawn) -> Fragment {
     let words = words_of(drawn);
     let values = values_in(words);
     let at = drawn.at.xy;
@@ -37,5 +37,5 @@ fn fragment(drawn: Drawn) -> @location(0) vec4f {
     let here = fma(values[1], Value(offset.x), values[2] * offset.y);
     let front = clamp(fma(fma(values[3], Value(near.x), here), Value(share.x), values[0]), values[4], values[5]);
     let back = select(front, clamp(fma(fma(values[3], Value(near.y), here), Value(share.y), values[0]), values[4], values[5]), is_met);
-    return quantised(colored(front, back, length, words), at, u32(rare.w));
+    return fragment_of(front, back, length, words, at, u32(rare.w));
 }

@@ -52,6 +52,9 @@ pub struct Geometry {
     tetrahedron_of: Vec<u32>,
     /// True if several points of the mesh share a position.
     welded: bool,
+    /// A bit for each cell, 64 in a word, where cells have neighbours: its corners are a left-handed system, for flat cells by what
+    /// their neighbours are.
+    left_handed: Vec<u64>,
 }
 
 impl Geometry {
@@ -93,7 +96,9 @@ impl Geometry {
             })
             .collect();
         let boundary = Boundary::new(&points, boundary);
-        Geometry { centre, scale, points, cells, boundary, point_of, tetrahedron_of, welded: faces.weld.is_some() }
+        let left_handed = left_handed(&faces.orientation, |i| tetrahedron_of[i] as usize);
+        let welded = faces.weld.is_some();
+        Geometry { centre, scale, points, cells, boundary, point_of, tetrahedron_of, welded, left_handed }
     }
 
     /// Prepares `tetrahedra` for engines that do not walk: cells have no neighbours, and there is no boundary.
@@ -118,6 +123,18 @@ impl Geometry {
             .map(|&(t, k)| boundary::BoundaryFace { points: faces.outward(&corners, (t, k)), cell: t })
             .collect();
         self.boundary = Boundary::new(&self.points, boundary);
+        self.left_handed = left_handed(&faces.orientation, |i| i);
+    }
+
+    /// Whether cells know their neighbours.
+    pub(crate) fn is_connected(&self) -> bool {
+        self.left_handed.len() == self.cells.len().div_ceil(64)
+    }
+
+    /// Whether the corners of a cell, of a mesh whose cells have neighbours, are a left-handed system.
+    #[inline(always)]
+    pub(crate) fn is_left_handed(&self, cell: usize) -> bool {
+        self.left_handed[cell / 64] >> (cell % 64) & 1 == 1
     }
 
     /// The positions of the points of the mesh and those that its split added, so many, normalised: as far as cells use
@@ -286,6 +303,16 @@ impl<const N: usize> Values<N> {
             Values::Corner(v) => size_of_val(&**v) as u64,
         }
     }
+}
+
+/// The bits of [`Geometry::left_handed`], of the signs of the volumes of tetrahedra and the one that each cell is.
+fn left_handed(orientation: &[i8], tetrahedron: impl Fn(usize) -> usize + Sync) -> Vec<u64> {
+    let n = orientation.len();
+    let word = |w: usize| {
+        let cells = 64 * w..n.min(64 * w + 64);
+        cells.fold(0, |bits, i| bits | u64::from(orientation[tetrahedron(i)] < 0) << (i % 64))
+    };
+    (0..n.div_ceil(64)).into_par_iter().with_min_len(1024).map(word).collect()
 }
 
 /// The least and the greatest eigenvalue of a symmetric matrix, by Jacobi's rotations (1846).

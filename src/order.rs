@@ -1,6 +1,19 @@
 //! Visibility order: in which sequence cells are drawn, from back to front.
+//!
+//! [`depth`] sorts cells by a key; [`mpvo`] finds the order of a mesh whose cells know their neighbours, of which `published`
+//! has the forms of the literature; [`check`] counts where an order is wrong.
 
+pub mod check;
+mod convex;
+pub(crate) mod crossings;
+mod cycles;
 pub mod depth;
+mod facing;
+mod gaps;
+mod graph;
+pub mod mpvo;
+mod published;
+pub(crate) mod screen;
 
 /// The bit of an entry from which on it says how many parts of the cell came before; those below it are the cell.
 pub const PART: u32 = 30;
@@ -26,4 +39,6 @@ pub enum Provenance {
     None,
     /// The distance of the cells' centres from the eye: right where cells are alike and meet face to face.
     Depth,
+    /// Which cell is before which, by the faces between them, and by the rays that leave the mesh and enter it again.
+    Mesh,
 }

@@ -1,12 +1,13 @@
-//! The projection engine: cells are sorted by depth, projected to triangles, and blended from back to front.
+//! The projection engine: cells are put in order, projected to triangles, and blended from back to front.
 //!
 //! Shirley & Tuchman's projected tetrahedra (1990) as Kraus, Qiao & Ebert made them right (Projecting Tetrahedra
-//! without Rendering Artifacts, 2004). It needs no neighbours, so it also draws meshes whose topology moves; and it is
-//! a test bed, in which each published variant can be switched on: [`Switches`] are what differs.
+//! without Rendering Artifacts, 2004). Its order is that of [`crate::order::mpvo`]; sorted by depth it needs no neighbours, so it also
+//! draws meshes whose topology moves. It is a test bed, in which each published variant can be switched on: [`Switches`] are what differs.
 
 pub(crate) mod cpu;
 pub(crate) mod gpu;
 
+use crate::order::mpvo::Rule;
 use serde::{Deserialize, Serialize};
 
 /// Which variant of the engine draws. The default is the most accurate.
@@ -19,6 +20,8 @@ pub struct Switches {
     pub thickness: Thickness,
     /// In which sequence cells are drawn.
     pub order: Order,
+    /// What becomes of pixels that see cells which hide each other in a circle, with [`Order::Mpvo`].
+    pub cycles: Cycles,
     /// What cells are blended into.
     pub target: Target,
     /// Alpha dithering (Kraus et al. 2004, section 4.2): before they are blended into 8 bits, opacities are rounded up
@@ -29,6 +32,11 @@ pub struct Switches {
 }
 
 impl Switches {
+    /// Whether the walk may draw pixels of the picture.
+    pub(crate) fn walks(&self) -> bool {
+        self.cycles == Cycles::Walk && self.compositing == Compositing::Over && self.target == Target::Rgba32float
+    }
+
     /// Whether anything is rounded at random.
     pub(crate) fn dithers(&self) -> bool {
         self.dither && self.target == Target::Rgba8
@@ -64,14 +72,47 @@ pub enum Thickness {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Order {
-    /// From back to front by the distance of their centres.
+    /// From back to front by the faces between them, and by the rays that leave the mesh and enter it again: right for every pixel
+    /// ([`crate::order::mpvo`]). It needs the cells' neighbours; in a mesh that changes with each frame it is [`Self::Depth`].
     #[default]
+    Mpvo,
+    /// By the faces between them, depth first, as Williams (1992) has it for convex meshes.
+    MpvoConvex,
+    /// The same, for meshes that are not convex: from the farthest on, by the distance of their centres (Williams' MPVONC).
+    Mpvonc,
+    /// The same, and by the rays that leave the mesh and enter it again (Silva, Mitchell & Williams 1998).
+    Xmpvo,
+    /// From back to front by the distance of their centres.
     Depth,
     /// From back to front by the power of the eye with respect to their circumspheres, in f64: right for all cells of a
     /// Delaunay mesh whose powers differ by more than rounding, and far off for slivers of others.
     Circumsphere,
     /// As they are stored.
     None,
+}
+
+impl Order {
+    /// The rule of the mesh's order; none for sequences that need no neighbours.
+    pub(crate) fn rule(self) -> Option<Rule> {
+        match self {
+            Order::Mpvo => Some(Rule::Mpvo),
+            Order::MpvoConvex => Some(Rule::Convex),
+            Order::Mpvonc => Some(Rule::Nonconvex),
+            Order::Xmpvo => Some(Rule::Xmpvo),
+            Order::Depth | Order::Circumsphere | Order::None => None,
+        }
+    }
+}
+
+/// What becomes of pixels that see cells which hide each other in a circle. The circle is cut where the fewest pixels see it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Cycles {
+    /// The walk draws those that see the cut, in pictures that are blended by their opacity into 32-bit floats.
+    #[default]
+    Walk,
+    /// They stay as they are: wrong.
+    Cut,
 }
 
 /// What cells are blended into.
@@ -103,10 +144,17 @@ pub enum Compositing {
 pub(crate) struct Counts {
     /// Cells that were drawn.
     pub(crate) cells: u64,
+    /// What they were ordered by.
+    pub(crate) order: Order,
     /// Finding the cells that are seen and sorting them; 0 where the order was known.
     pub(crate) order_ms: f64,
     /// How often cells were sorted.
     pub(crate) sorts: u32,
+    /// Groups of cells that hide each other in a circle, and these cells; what was cut of them; and pixels whose cells overlap.
+    pub(crate) cycles: u32,
+    pub(crate) cycle_cells: u64,
+    pub(crate) cuts: u64,
+    pub(crate) overlapping: u64,
     /// By the device's own clock, where it has one, or in software the host's: projecting all cells of the order, and
     /// drawing them.
     pub(crate) project_ms: Option<f64>,

@@ -5,6 +5,7 @@ mod backend;
 mod frame;
 mod grid;
 mod loaded;
+mod neighbours;
 mod prepared;
 mod recover;
 mod second;
@@ -34,6 +35,7 @@ use frame::Frame;
 use glam::DVec3;
 use grid::LoadedGrid;
 use loaded::Loaded;
+use neighbours::Stay;
 use prepared::{AnyValues, Prepared};
 use second::Extra;
 pub use stats::{ProjectionStats, Stats, SweepStats};
@@ -55,6 +57,7 @@ pub struct Renderer {
     backend: Backend,
     switches: Switches,
     mesh: Option<Loaded>,
+    stay: Stay,
     /// The grid that is drawn, in place of a mesh.
     grid: Option<LoadedGrid>,
     reconstruction: Reconstruction,
@@ -120,6 +123,7 @@ impl Renderer {
             backend,
             switches: Switches::default(),
             mesh: None,
+            stay: Stay::default(),
             grid: None,
             reconstruction: Reconstruction::default(),
             field: None,
@@ -231,7 +235,9 @@ impl Renderer {
     ) {
         self.grid = None;
         let start = Instant::now();
-        let needs = self.backend.needs();
+        self.stay.change();
+        let mut needs = self.backend.needs();
+        needs.neighbours |= self.orders_by_neighbours();
         let mesh = self.pool.install(|| Loaded::new(points, cells, tetrahedra, needs, report));
         report(1.0);
         self.stats.faces_ms = ms(start);
@@ -378,6 +384,7 @@ impl Renderer {
         }
         let start = Instant::now();
         self.judge_thickness()?;
+        self.connect_for_order()?;
         let walks = self.mesh.as_ref().is_some_and(|m| m.left_to_walk);
         let on_device =
             !walks && !self.host_builds && self.backend.gpu().is_some_and(|gpu| builds(gpu, &self.integral));
@@ -460,6 +467,7 @@ impl Renderer {
         (self.stats.cpu_rays, self.stats.panels) = (counts.unfinished, 0);
         (self.stats.projection, self.stats.sweep) = (projection, sweep);
         self.stats.frame_ms = ms(start);
+        self.stay.draw();
         self.build_next(late)?;
         Ok(Image { size: view.size(), pixels })
     }

@@ -105,17 +105,31 @@ impl Boundary {
 
     /// Calls `found` with the index of every face that a ray of `beam` may meet, and perhaps of others near it.
     pub fn for_each_in(&self, beam: &Beam, mut found: impl FnMut(usize)) {
+        self.for_each_where(
+            |b| b[0].x <= b[1].x && beam.meets(b),
+            |face| {
+                found(face);
+                false
+            },
+        );
+    }
+
+    /// Calls `found` with the index of every face in a box that `wants` is true of, and of all boxes around it; until `found`
+    /// answers true.
+    pub(crate) fn for_each_where(&self, wants: impl Fn([DVec3; 2]) -> bool, mut found: impl FnMut(usize) -> bool) {
         let first_leaf = self.boxes.len() / 2;
         let mut stack = vec![0];
         while let Some(node) = stack.pop() {
-            if self.faces.is_empty() || self.boxes[node][0].x > self.boxes[node][1].x || !beam.meets(self.boxes[node]) {
+            if self.faces.is_empty() || !wants(self.boxes[node]) {
                 continue;
             }
             if node < first_leaf {
                 stack.extend([2 * node + 2, 2 * node + 1]);
             } else {
                 let start = (node - first_leaf) * LEAF;
-                (start..self.faces.len().min(start + LEAF)).for_each(&mut found);
+                if (start..self.faces.len().min(start + LEAF)).any(&mut found) {
+                    return;
+                }
             }
         }
     }

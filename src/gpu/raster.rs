@@ -219,6 +219,9 @@ pub(crate) fn compute(
     })
 }
 
+/// What pipelines without blending keep the greatest of.
+pub(crate) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
 /// A pipeline of the entry points "vertex" and "fragment" that draws triangles of vertices with these `attributes`,
 /// each `stride` bytes apart in every binding, onto one picture, but for those `culled`.
 pub(crate) fn render(
@@ -227,7 +230,7 @@ pub(crate) fn render(
     layout: &wgpu::PipelineLayout,
     (stride, attributes): (u64, &[Vec<wgpu::VertexAttribute>]),
     format: wgpu::TextureFormat,
-    blend: wgpu::BlendComponent,
+    blend: Option<wgpu::BlendComponent>,
     culled: Option<wgpu::Face>,
 ) -> wgpu::RenderPipeline {
     let binding = |attributes| {
@@ -244,7 +247,13 @@ pub(crate) fn render(
             buffers: &buffers,
         },
         primitive: wgpu::PrimitiveState { cull_mode: culled, ..Default::default() },
-        depth_stencil: None,
+        depth_stencil: blend.is_none().then(|| wgpu::DepthStencilState {
+            format: DEPTH,
+            depth_write_enabled: Some(true),
+            depth_compare: Some(wgpu::CompareFunction::Greater),
+            stencil: Default::default(),
+            bias: Default::default(),
+        }),
         multisample: wgpu::MultisampleState::default(),
         fragment: Some(wgpu::FragmentState {
             module,
@@ -252,7 +261,7 @@ pub(crate) fn render(
             compilation_options: Default::default(),
             targets: &[Some(wgpu::ColorTargetState {
                 format,
-                blend: Some(wgpu::BlendState { color: blend, alpha: blend }),
+                blend: blend.map(|blend| wgpu::BlendState { color: blend, alpha: blend }),
                 write_mask: wgpu::ColorWrites::ALL,
             })],
         }),

@@ -1,12 +1,11 @@
 //! The projection on the CPU: cells are dealt to tiles of the image, ordered tile by tile, and swept from front to back with
 //! neighbouring pixels in vector lanes. Nothing is gathered: a cell's numbers are the same for all of its pixels.
 //!
-//! The stages: [`coarse`] projects points and deals cells to tiles, [`setup`] makes records of a tile's cells, [`order`]
+//! The stages: [`screen`] projects points and deals cells to tiles, [`setup`] makes records of a tile's cells, [`order`]
 //! finds their sequence, [`fine`] finds and checks their pixels, [`measure`] integrates. Each pixel checks that what it
 //! composites is the mesh along its ray, piece after piece; those where it is not are drawn again by the walk. So the
 //! picture is the walk's where the order fails.
 
-mod coarse;
 mod fine;
 mod flat;
 mod lanes;
@@ -18,12 +17,13 @@ pub(crate) mod tests;
 
 use crate::geometry::{Geometry, Values};
 use crate::integral::Integral;
+use crate::order::crossings::{self, Crossings};
+use crate::order::screen::{self, Dealt, Lens, PixelBox, TILE};
 use crate::traverse::cpu;
 use crate::view::{Blend, View};
-use coarse::{Dealt, Lens, PixelBox, TILE};
 use fearless_simd::{Level, Simd};
 use fine::{Canvas, Flaw};
-use order::{Crossings, Order};
+use order::Order;
 use rayon::prelude::*;
 use setup::{Record, Scene};
 use std::ops::ControlFlow;
@@ -141,11 +141,11 @@ impl Sweep {
         let mut pixels = vec![[0.0; 4]; size[0] as usize * size[1] as usize];
         let Some(lens) = Lens::new(frame.geometry, frame.view) else { return (pixels, Counts::default()) };
         let Frame { geometry, values, .. } = *frame;
-        coarse::project(&lens, &geometry.points, &mut self.places);
+        screen::project(&lens, &geometry.points, &mut self.places);
         let (points, places, [of_cells, of_faces]) = (&geometry.points, &self.places, &mut self.boxes);
-        coarse::all_bounds(&lens, points, places, geometry.cells.len(), |i| geometry.cells[i].corners, of_cells);
+        screen::all_bounds(&lens, points, places, geometry.cells.len(), |i| geometry.cells[i].corners, of_cells);
         let all = &geometry.boundary.faces;
-        coarse::all_bounds(&lens, points, places, all.len(), |i| all[i].points, of_faces);
+        screen::all_bounds(&lens, points, places, all.len(), |i| all[i].points, of_faces);
         let (cells, faces) = (Dealt::new(&lens, of_cells), Dealt::new(&lens, of_faces));
         let (exact, blend) = (frame.integral.exact, frame.view.blend());
         let steepest = exact.opacity.steepest();
@@ -259,7 +259,7 @@ impl Sweep {
         let size = [target.rows[0].len() as u32, target.rows.len() as u32];
         canvas.finish(scene, &frame.integral, crossings, size, frame.color, |i, j, light, flaw| {
             target.rows[j as usize][i as usize] = light;
-            done.covered += u64::from(crossings.any(order::place(i, j)));
+            done.covered += u64::from(crossings.any(crossings::place(i, j)));
             if flaw != Flaw::None {
                 done.flawed.push(((corner[1] + j) as usize * width + (corner[0] + i) as usize, flaw));
             }

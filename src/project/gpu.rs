@@ -2,7 +2,7 @@
 //!
 //! 1. `classify` (compute) finds the cells that are seen, and a key of depth for each; for devices in software the host
 //!    does.
-//! 2. These are sorted.
+//! 2. These are put in order: that of the mesh, which the host finds, or by the keys.
 //! 3. Batch by batch, in that order, `project` (compute) makes a record of each cell, and the records are drawn.
 
 mod drawing;
@@ -13,7 +13,7 @@ mod ordering;
 mod program;
 mod record;
 
-use super::{Counts, Fragments, Switches, Target};
+use super::{Counts, Fragments, Order, Switches, Target};
 use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Values};
 use crate::gpu::buffers::{Buffer, Chunks};
@@ -22,13 +22,15 @@ use crate::gpu::shader::{Array, Variant};
 use crate::gpu::sort::Sorter;
 use crate::gpu::{DeviceChoice, Gpu, Part, arrays, function, table};
 use crate::integral::{Exact, Lookup};
+use crate::order::mpvo::Mpvo;
 use crate::view::{Blend, View};
 use bytemuck::{Pod, Zeroable};
 use drawing::Canvas;
 use frame::Seen;
+use keys::Parts;
 use lines::{Extent, Lines};
-use ordering::Ordered;
-use program::{Program, program};
+use ordering::{Ordered, Sequenced, Sequencing};
+use program::{Drawn, Program, program};
 use record::Layout;
 use std::sync::Arc;
 use std::time::Instant;
@@ -69,6 +71,9 @@ pub(crate) struct Project {
     values: Option<Chunks>,
     extent: Option<Extent>,
     function: Option<HeldFunction>,
+    /// What is known of the order of the mesh, and the last one.
+    mpvo: Mpvo,
+    sequence: Option<Sequenced>,
     /// The last ones, that of this frame first.
     programs: Vec<Program>,
     canvas: Option<Canvas>,
@@ -77,6 +82,8 @@ pub(crate) struct Project {
     sorter: Option<Sorter>,
     /// Whether the device sorts, and not the host.
     sorts: bool,
+    /// Entries of one buffer of an order that the host finds, a multiple of [`BATCH`].
+    order_chunk: usize,
 }
 
 impl std::fmt::Debug for Project {
@@ -124,12 +131,15 @@ impl Project {
             values: None,
             extent: None,
             function: None,
+            mpvo: Mpvo::default(),
+            sequence: None,
             programs: vec![],
             canvas: None,
             ordered: None,
             table: table::Held::default(),
             sorter: None,
             sorts,
+            order_chunk: BATCH << 6,
         })
     }
 
@@ -144,11 +154,20 @@ impl Project {
         self.programs.clear();
     }
 
+    /// Keeps so many entries of an order in one buffer from now on.
+    #[cfg(test)]
+    pub(crate) fn keep_in_chunks_of(&mut self, entries: usize) {
+        (self.order_chunk, self.ordered) = (entries, None);
+    }
+
     /// Takes `part` for changed.
     pub(crate) fn forget(&mut self, part: Part) {
         self.ordered = None;
         if part != Part::Function {
             self.extent = None;
+        }
+        if matches!(part, Part::Mesh | Part::Points) {
+            (self.mpvo, self.sequence) = (Mpvo::default(), None);
         }
         match part {
             Part::Mesh => (self.cells, self.points, self.values) = (None, None, None),
@@ -194,11 +213,11 @@ impl Project {
         self.table.prepare(gpu, table, &self.function.insert(function).buffers)
     }
 
-    /// Draws a frame; premultiplied colours, row by row.
+    /// Draws a frame; premultiplied colours, row by row; for [`Blend::Maximum`] the largest values instead, as
+    /// [`crate::traverse::gpu::Traverse::largest`] reads them.
     ///
     /// # Errors
-    /// [`Error::View`] for [`Blend::Maximum`], [`Error::Device`] if the device cannot blend into the target, and those
-    /// of [`Gpu::check`] and [`Buffer::new`].
+    /// [`Error::Device`] if the device cannot blend into the target, and those of [`Gpu::check`] and [`Buffer::new`].
     pub(crate) fn render<const N: usize>(
         &mut self,
         geometry: &Geometry,
@@ -208,11 +227,10 @@ impl Project {
         view: &View,
         switches: &Switches,
     ) -> Result<(Vec<[f32; 4]>, Counts)> {
-        if view.blend() == Blend::Maximum {
-            let what = "the projection engine does not draw the maximum along rays; the engine \"traverse\" does";
-            return Err(Error::View(what.into()));
-        }
-        let format = self.format(switches.target)?;
+        let is_maximum = view.blend() == Blend::Maximum;
+        // Nothing is blended, and no segment integrated.
+        let format = if is_maximum { wgpu::TextureFormat::Rgba32Float } else { self.format(switches.target)? };
+        let table = table.filter(|_| !is_maximum);
         self.upload(geometry, values)?;
         self.prepare_table(exact, table)?;
         let extent = *self.extent.get_or_insert_with(|| Extent::new(geometry, values));
@@ -222,6 +240,7 @@ impl Project {
         let is_rare = switches.fragments == Fragments::Intersected && (switches.dithers() || seen.limits().any());
         let lines = match table {
             Some(_) => Lines::None,
+            None if is_maximum => Lines::None,
             // Devices that sort draw cells in one part; they do not mind look-ups.
             None if self.sorts => Lines::looked_up(exact.kind),
             None => Lines::new(exact, extent, switches.fragments == Fragments::Intersected),
@@ -234,19 +253,41 @@ impl Project {
         // Processors do 4 × 4 pixels, graphics cards 2 × 2.
         limits.block = if self.sorts { 2 } else { 4 };
         limits.plane_per_cell = one_plane && switches.fragments != Fragments::Intersected;
-        let source = program(&variant, association, switches, &layout, table.map(|t| &**t), limits, &arrays);
-        self.prepare_canvas(&layout, view.size(), format)?;
-        self.compile(&arrays, source, switches, layout, format)?;
+        let drawn = Drawn { switches, blend: view.blend() };
+        let source = program(&variant, association, drawn, &layout, table.map(|t| &**t), limits, &arrays);
+        self.prepare_canvas(&layout, view.size(), format, is_maximum)?;
+        self.compile(&arrays, source, drawn, layout, format)?;
         let frame = Pass::new(self, &seen)?;
-        let mut counts = Counts::default();
-        if !self.ordered.as_ref().is_some_and(|o| o.holds_for(&seen, switches, lines)) {
+        // Without neighbours there is depth.
+        let by = match switches.order {
+            // The largest value needs none.
+            _ if is_maximum => Order::None,
+            order if geometry.is_connected() || order.rule().is_none() => order,
+            _ => Order::Depth,
+        };
+        let mut counts = Counts { order: by, ..Counts::default() };
+        let asked = Sequencing { by, parts: Parts::new(switches, lines), all: is_maximum };
+        if !self.ordered.as_ref().is_some_and(|o| o.holds_for(&seen, asked)) {
             let start = Instant::now();
             self.ordered = None;
-            self.ordered = Some(self.order(&frame, &seen, geometry, values, switches, lines)?);
+            if let Some(rule) = by.rule() {
+                self.find_sequence(geometry, view, &seen, rule);
+            }
+            self.ordered = Some(self.order(&frame, &seen, geometry, values, asked)?);
             counts.sorts = 1;
             counts.order_ms = start.elapsed().as_secs_f64() * 1e3;
         }
+        if let Some(sequence) = self.sequence.as_ref().map(|s| &s.cells).filter(|_| by.rule().is_some()) {
+            (counts.cycles, counts.cycle_cells) = (sequence.cycles, sequence.cycle_cells);
+            (counts.cuts, counts.overlapping) = (sequence.cuts, sequence.overlapping);
+        }
         self.draw(&frame, view, &mut counts).map(|pixels| (pixels, counts))
+    }
+
+    /// The pixels of the last frame, ascending, whose cells are not in order: see [`crate::order::mpvo::Sequence::disordered`].
+    pub(crate) fn disordered(&self) -> &[u32] {
+        let of_mesh = self.ordered.as_ref().is_some_and(Ordered::is_of_mesh);
+        self.sequence.as_ref().filter(|_| of_mesh).map_or(&[], |s| &s.cells.disordered)
     }
 
     /// The texture that a target is.

@@ -35,6 +35,8 @@ pub(crate) enum Backend {
 pub(super) struct Needs {
     /// It reads the neighbours of cells and the boundary.
     pub(super) neighbours: bool,
+    /// It reads neighbours if it is to draw in an order that needs them.
+    pub(super) order: bool,
     /// Its lengths are of 32 bits, which do not tell those across a flat mesh: see [`Geometry::is_flat`].
     thickness: bool,
     /// Its lengths across a flat cell are off by [`COARSE`] of the cell's longest edge.
@@ -160,9 +162,11 @@ impl Backend {
     /// What it needs of a mesh.
     pub(super) fn needs(&self) -> Needs {
         match self {
-            Backend::Walk | Backend::Project(_) => Needs { neighbours: true, thickness: false, cells: false },
-            Backend::WalkOnDevice(_) => Needs { neighbours: true, thickness: true, cells: false },
-            Backend::ProjectOnDevice(_) => Needs { neighbours: false, thickness: true, cells: true },
+            Backend::Walk | Backend::Project(_) => {
+                Needs { neighbours: true, order: false, thickness: false, cells: false }
+            }
+            Backend::WalkOnDevice(_) => Needs { neighbours: true, order: false, thickness: true, cells: false },
+            Backend::ProjectOnDevice(_) => Needs { neighbours: false, order: true, thickness: true, cells: true },
         }
     }
 
@@ -263,10 +267,33 @@ fn project_by<const N: usize>(sweep: &mut Sweep, frame: &Frame, values: &Values<
 
 fn project_on<const N: usize>(project: &mut Project, frame: &Frame, values: &Values<N>) -> Result<Drawn> {
     let Frame { mesh, exact, table, view, switches, .. } = frame;
-    let (pixels, counts) = project.render(&mesh.geometry, values, exact, *table, view, switches)?;
+    let (mut pixels, counts) = project.render(&mesh.geometry, values, exact, *table, view, switches)?;
+    let mut walked = vec![];
+    if view.blend() == Blend::Maximum {
+        let color = |p: &[f32; 4]| Traverse::largest(p).map_or([0.0; 4], |v: [f32; N]| frame.largest(&v));
+        pixels.par_iter_mut().for_each(|p| *p = color(p));
+    } else if switches.walks() {
+        walked.extend(project.disordered().iter().map(|&p| p as usize));
+        let color = |v: &[f32; N]| frame.largest(v);
+        let by_cpu = cpu::render_pixels(&mesh.geometry, values, integral(frame), &color, view, &walked);
+        walked.iter().zip(by_cpu).for_each(|(&i, p)| pixels[i] = p);
+    }
     let _ = (frame.progress)(1.0);
-    let project::Counts { cells, order_ms, sorts, project_ms, draw_ms, fragments } = counts;
-    let stats = ProjectionStats { drawn_cells: cells, order_ms, sorts, project_ms, draw_ms, fragments };
+    let project::Counts { project_ms, draw_ms, .. } = counts;
+    let stats = ProjectionStats {
+        drawn_cells: counts.cells,
+        order: counts.order,
+        order_ms: counts.order_ms,
+        sorts: counts.sorts,
+        cycles: counts.cycles,
+        cycle_cells: counts.cycle_cells,
+        cuts: counts.cuts,
+        walked_pixels: walked.len() as u64,
+        overlapping_pixels: counts.overlapping,
+        project_ms,
+        draw_ms,
+        fragments: counts.fragments,
+    };
     let device_ms = project_ms.zip(draw_ms).map(|(p, d)| p + d);
     Ok(Drawn { pixels, device_ms, projection: Some(stats), ..Drawn::default() })
 }

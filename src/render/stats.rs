@@ -1,5 +1,7 @@
 //! What a renderer tells of its work.
 
+use crate::project::Order;
+
 /// What a renderer did and how long it took.
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub struct Stats {
@@ -53,10 +55,22 @@ pub struct Stats {
 pub struct ProjectionStats {
     /// Cells that were drawn, each once, also where it is drawn in parts.
     pub drawn_cells: u64,
+    /// What decided the sequence of cells.
+    pub order: Order,
     /// Finding the cells that are seen and sorting them, in ms; 0 if the camera stood still.
     pub order_ms: f64,
     /// How often cells were sorted: once, or not at all where the order of the frame before holds.
     pub sorts: u32,
+    /// Groups of cells that hide each other in a circle, as seen from here.
+    pub cycles: u32,
+    /// The cells of these.
+    pub cycle_cells: u64,
+    /// Pairs of cells whose sequence is wrong, as circles had to be cut.
+    pub cuts: u64,
+    /// Pixels that the walk drew, as they see such a pair.
+    pub walked_pixels: u64,
+    /// Pixels whose rays are in several cells at a time: such cells have no order. None are looked for in a convex mesh.
+    pub overlapping_pixels: u64,
     /// Projecting them, by the device's own clock, in ms, where it has one.
     pub project_ms: Option<f64>,
     /// Drawing them, likewise.

@@ -2,7 +2,6 @@
 
 use super::{Engine, Renderer};
 use crate::error::Result;
-use crate::gpu::Part;
 use crate::project::Switches;
 
 impl Renderer {
@@ -17,13 +16,7 @@ impl Renderer {
             return Ok(());
         }
         if mesh.left_to_walk && !mesh.connected {
-            self.pool.install(|| mesh.geometry.connect());
-            mesh.connected = true;
-            self.extra.forget_field();
-            if let Some(field) = &mut self.field {
-                self.pool.install(|| field.bring_to(mesh))?;
-            }
-            self.backend.forget(Part::Mesh);
+            self.connect_in_place()?;
         }
         self.name_device();
         Ok(())

@@ -1,4 +1,5 @@
 mod forms;
+mod orders;
 
 use crate::render::{self, Job, Request};
 use crate::{output, parse, progress};
@@ -38,6 +39,9 @@ pub(crate) struct Options {
     /// Compare the forms of the integral instead, in both engines: the exact one and all tables
     #[arg(long)]
     integrals: bool,
+    /// Compare the orders of cells instead: where each is wrong, and what it takes
+    #[arg(long, conflicts_with = "integrals")]
+    orders_of_cells: bool,
     /// Write errors and times as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -100,6 +104,7 @@ fn variants(table: Option<[u32; 3]>) -> Vec<Variant> {
         variant("log-normalised, float", "", interpolated, volume(Kind::LogNormalised, Texels::Float)),
         variant("interpolated, exact", "", interpolated, exact),
         variant("intersected, exact", "", best, exact),
+        variant("by depth", "", Switches { order: Order::Depth, ..best }, exact),
         variant("by circumspheres", "", Switches { order: Order::Circumsphere, ..best }, exact),
         variant("not sorted", "", Switches { order: Order::None, ..best }, exact),
     ]
@@ -112,6 +117,9 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     }
     if options.integrals {
         return forms::run(options, threads);
+    }
+    if options.orders_of_cells {
+        return orders::run(options, threads);
     }
     let given = options.request.scene()?;
     let size = options.request.studied(given.as_ref())?.or(Some([256, 256, 16]));

@@ -2,7 +2,7 @@
 
 use anyhow::{Result, anyhow};
 use clap::Args;
-use halite::project::{Compositing, Fragments, Order, Switches, Target, Thickness};
+use halite::project::{Compositing, Cycles, Fragments, Order, Switches, Target, Thickness};
 use halite::scene::{Scene, read};
 use serde::de::DeserializeOwned;
 use std::path::Path;
@@ -16,9 +16,13 @@ pub(crate) struct Variant {
     /// How long a ray's way through an interpolated cell is: distance, or depth
     #[arg(long, value_name = "KIND", value_parser = named::<Thickness>, help_heading = "Projection engine")]
     thickness: Option<Thickness>,
-    /// In which sequence cells are drawn: depth, circumsphere (for Delaunay meshes, as exact as f64), or none
+    /// In which sequence cells are drawn: mpvo (right for every pixel), mpvo-convex, mpvonc and xmpvo (as published), depth,
+    /// circumsphere (for Delaunay meshes, as exact as f64), or none
     #[arg(long, value_name = "KIND", value_parser = named::<Order>, help_heading = "Projection engine")]
     order: Option<Order>,
+    /// What draws pixels that see cells which hide each other in a circle: walk, or cut (they stay wrong)
+    #[arg(long, value_name = "KIND", value_parser = named::<Cycles>, help_heading = "Projection engine")]
+    cycles: Option<Cycles>,
     /// What cells are blended into: rgba32float, rgba16float or rgba8
     #[arg(long, value_name = "FORMAT", value_parser = named::<Target>, help_heading = "Projection engine")]
     target: Option<Target>,
@@ -38,6 +42,7 @@ impl Variant {
             fragments: self.fragments.unwrap_or(switches.fragments),
             thickness: self.thickness.unwrap_or(switches.thickness),
             order: self.order.unwrap_or(switches.order),
+            cycles: self.cycles.unwrap_or(switches.cycles),
             target: self.target.unwrap_or(switches.target),
             dither: self.dither.unwrap_or(switches.dither),
             compositing: self.compositing.unwrap_or(switches.compositing),
@@ -50,6 +55,7 @@ impl Variant {
             ("--fragments", self.fragments.is_some()),
             ("--thickness", self.thickness.is_some()),
             ("--order", self.order.is_some()),
+            ("--cycles", self.cycles.is_some()),
             ("--target", self.target.is_some()),
             ("--dither", self.dither.is_some()),
             ("--compositing", self.compositing.is_some()),

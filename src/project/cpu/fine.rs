@@ -4,11 +4,11 @@
 //! is outside the mesh, by its crossings of the boundary; at the end nothing of the mesh may be left. A pixel of which that is not
 //! true is flagged, and drawn again by other means. So the picture does not rest on the order of the cells.
 
-use super::coarse::{ASIDE, NEAREST, TILE};
 use super::measure::Fragments;
-use super::order::{Crossings, place};
 use super::setup::{Look, Record, Scene};
 use crate::integral::{Batch, Integral, Light};
+use crate::order::crossings::{Crossings, place};
+use crate::order::screen::{ASIDE, NEAREST, TILE};
 use crate::traverse::cpu::least_light;
 use crate::view::{Blend, View};
 use fearless_simd::prelude::*;

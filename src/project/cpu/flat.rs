@@ -1,6 +1,6 @@
 //! One cell in f64, pixel by pixel: for cells whose thickness f32 cannot tell. The equations are those of `setup`.
 
-use super::coarse::{Lens, NEAREST};
+use crate::order::screen::{Lens, NEAREST};
 use glam::DVec3;
 
 /// A cell relative to its deepest corner.

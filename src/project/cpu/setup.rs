@@ -1,7 +1,7 @@
 //! Set-up: what the sweep knows of a cell, formed in f64 and kept in f32, four cells at a time.
 //!
 //! A cell is told relative to one of its corners R, at depth w_R, seen at (X_R, Y_R). In the frame that is sheared so that R's
-//! ray is the axis, corner k minus R is e_k = (Δh.x − X_R Δh.z, Δh.y − Y_R Δh.z, Δh.z) with Δh = h_k − h_R ([`super::coarse`]). On
+//! ray is the axis, corner k minus R is e_k = (Δh.x − X_R Δh.z, Δh.y − Y_R Δh.z, Δh.z) with Δh = h_k − h_R ([`crate::order::screen`]). On
 //! the ray of a pixel at (x, y) from (X_R, Y_R) let τ be the depth beyond w_R and v = w_R τ/(w_R + τ) = w_R − w_R²/w: like 1/w it is
 //! linear on the screen on each face, but as small as the cell is, so f32 keeps its digits. With a₁ = e₂ × e₃ and so on, S = Σ a_i and
 //! D = e₁ · a₁, all of the sign that makes D > 0, the face opposite to corner i (which holds R) has
@@ -10,13 +10,13 @@
 //!     v = w_R (D − w_R (S.x x + S.y y))/c,                and is turned to the eye if c < 0.
 //! A ray is inside between the greatest v of faces turned to the eye and the least of the others. With κ = 1/w_R, τ = v/(1 − κ v), so
 //! τ_out − τ_in = (v_out − v_in)/((1 − κ v_in)(1 − κ v_out)) without cancellation. The field is s_R + (w_R + τ)(g.x x + g.y y) + τ g.z
-//! with g = Σ (s_i − s_R) a_i/D. The key of a depth (`coarse`) is V_R + (w₀/w_R)² v.
+//! with g = Σ (s_i − s_R) a_i/D. The key of a depth (`screen`) is V_R + (w₀/w_R)² v.
 //!
 //! Parallel views are the same with e_k = Δh, 1 for w_R, κ = 0, c = S.z and V = V_R + v.
 
-use super::coarse::{ASIDE, Lens, PixelBox, TILE};
 use crate::geometry::{Geometry, Values};
 use crate::integral::Exact;
+use crate::order::screen::{ASIDE, Lens, PixelBox, TILE};
 use crate::view::Blend;
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f64x4, u8x16};

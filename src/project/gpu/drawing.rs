@@ -5,7 +5,8 @@ use super::{BATCH, Pass, Project, Slice, groups_of, unprepared};
 use crate::error::Result;
 use crate::gpu::buffers::Buffer;
 use crate::gpu::clock::{CLOCKS, Clock};
-use crate::gpu::raster::{Readback, Texture};
+use crate::gpu::raster::{self, Readback, Texture};
+use crate::gpu::rays::FAR;
 use crate::project::Counts;
 use crate::view::View;
 use std::time::Instant;
@@ -22,6 +23,8 @@ pub(super) struct Canvas {
     records: Buffer,
     indices: Buffer,
     picture: Texture,
+    /// Where the greatest of something is kept, how great that is.
+    depth: Option<Texture>,
     back: Readback,
 }
 
@@ -31,8 +34,11 @@ impl Project {
         layout: &Layout,
         size: [u32; 2],
         format: wgpu::TextureFormat,
+        keeps_greatest: bool,
     ) -> Result<()> {
-        if self.canvas.as_ref().is_some_and(|c| (&c.layout, c.size, c.format) == (layout, size, format)) {
+        let is_same =
+            |c: &Canvas| (&c.layout, c.size, c.format, c.depth.is_some()) == (layout, size, format, keeps_greatest);
+        if self.canvas.as_ref().is_some_and(is_same) {
             return Ok(());
         }
         self.canvas = None;
@@ -40,18 +46,16 @@ impl Project {
         let Layout { triangles, parts, .. } = *layout;
         let all: Vec<u32> = (0..BATCH as u32).flat_map(|r| triangles.iter().map(move |c| r * parts + c)).collect();
         let [w, h] = size;
+        let texture =
+            |name, format, usage| Texture::new(gpu, name, wgpu::TextureDimension::D2, [w, h, 1], format, usage);
         let canvas = Canvas {
             // One more, as the last one's vertices look for words beyond it.
             records: Buffer::new(gpu, "records", layout.bytes() * (BATCH as u64 + 1), Usage::STORAGE | Usage::VERTEX)?,
             indices: Buffer::holding(gpu, "indices", &all, Usage::INDEX)?,
-            picture: Texture::new(
-                gpu,
-                "picture",
-                wgpu::TextureDimension::D2,
-                [w, h, 1],
-                format,
-                TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC,
-            )?,
+            picture: texture("picture", format, TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC)?,
+            depth: keeps_greatest
+                .then(|| texture("depth", raster::DEPTH, TextureUsages::RENDER_ATTACHMENT))
+                .transpose()?,
             back: Readback::new(gpu, u64::from(row_bytes(w, format)) * u64::from(h) + 16 * u64::from(CLOCKS))?,
             layout: layout.clone(),
             size,
@@ -121,6 +125,7 @@ impl Project {
                 let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                     label: Some("draw"),
                     color_attachments: &[Some(attachment(&canvas.picture, wgpu::LoadOp::Load))],
+                    depth_stencil_attachment: canvas.depth.as_ref().map(|d| depth(d, wgpu::LoadOp::Load)),
                     timestamp_writes: clock.as_ref().and_then(|c| c.render(i)),
                     ..Default::default()
                 });
@@ -187,10 +192,13 @@ impl Project {
     }
 
     fn clear(&self, encoder: &mut wgpu::CommandEncoder, canvas: &Canvas) {
-        let clear = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
+        // A ray that meets nothing has no largest value.
+        let none = f64::from(if canvas.depth.is_some() { -FAR } else { 0.0 });
+        let clear = wgpu::LoadOp::Clear(wgpu::Color { r: none, g: none, b: none, a: none });
         encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("clear"),
             color_attachments: &[Some(attachment(&canvas.picture, clear))],
+            depth_stencil_attachment: canvas.depth.as_ref().map(|d| depth(d, wgpu::LoadOp::Clear(0.0))),
             ..Default::default()
         });
     }
@@ -202,6 +210,14 @@ fn attachment(texture: &Texture, load: wgpu::LoadOp<wgpu::Color>) -> wgpu::Rende
         depth_slice: None,
         resolve_target: None,
         ops: wgpu::Operations { load, store: wgpu::StoreOp::Store },
+    }
+}
+
+fn depth(texture: &Texture, load: wgpu::LoadOp<f32>) -> wgpu::RenderPassDepthStencilAttachment<'_> {
+    wgpu::RenderPassDepthStencilAttachment {
+        view: &texture.view,
+        depth_ops: Some(wgpu::Operations { load, store: wgpu::StoreOp::Store }),
+        stencil_ops: None,
     }
 }
 

@@ -5,6 +5,7 @@
 
 use super::frame::{GROWTH, Seen};
 use super::lines::{self, BINS, Lines};
+use super::ordering::Sequencing;
 use crate::geometry::{Cell, Geometry, Values};
 use crate::gpu::rays::FAR;
 use crate::order::MOST_PARTS;
@@ -139,17 +140,16 @@ pub(super) fn keys<const N: usize>(
     values: &Values<N>,
     bins: &[lines::End],
     seen: &Seen,
-    by: Order,
-    parts: Parts,
+    Sequencing { by, parts, all }: Sequencing,
 ) -> Vec<u32> {
     let places = places(&geometry.points, seen);
     let [.., forward] = seen.frame.axes();
     let ahead = seen.frame.ahead();
     let count = |i: usize, cell: &Cell| {
         let corners = cell.corners.map(|c| places[c as usize]);
-        let all = corners.iter().fold(!NEAR, |bits, c| bits & c.beyond);
+        let beyond = corners.iter().fold(!NEAR, |bits, c| bits & c.beyond);
         let is_near = corners.iter().any(|c| c.beyond & NEAR != 0);
-        if all != 0 || !is_near && between_pixels(corners.map(|c| c.pixel)) {
+        if beyond != 0 || !is_near && between_pixels(corners.map(|c| c.pixel)) {
             return 0;
         }
         let range = match values {
@@ -157,7 +157,7 @@ pub(super) fn keys<const N: usize>(
             Values::Corner(v) => range_of(v[i]),
             Values::Cell(v) => range_of([v[i]; 4]),
         };
-        match range.map_or(0, |range| parts_of(range, bins, parts)) {
+        match range.map_or(0, |range| if all { 1 } else { parts_of(range, bins, parts) }) {
             0 => 0,
             _ if is_near && parts == Parts::AroundEye => 3,
             count => count,

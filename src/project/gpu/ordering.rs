@@ -2,27 +2,33 @@
 
 use super::frame::{Frame, Seen};
 use super::keys::{self, Parts};
-use super::lines::Lines;
-use super::{BATCH, Pass, Project, Slice, groups_of, unprepared};
+use super::{Pass, Project, Slice, groups_of, unprepared};
 use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Values};
 use crate::gpu::buffers::Buffer;
 use crate::gpu::sort::Sorter;
 use crate::order::PART;
 use crate::order::depth::{self, HIDDEN};
-use crate::project::{Order, Switches};
+use crate::order::mpvo::{Rule, Sequence};
+use crate::project::Order;
+use crate::view::View;
 use rayon::prelude::*;
 use wgpu::BufferUsages as Usage;
 
-/// Entries of one buffer of the order, a multiple of [`BATCH`].
-pub(super) const ORDER_CHUNK: usize = BATCH << 6;
+/// How cells are put in sequence.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Sequencing {
+    pub(super) by: Order,
+    pub(super) parts: Parts,
+    /// Whether cells are drawn that the function shows nothing of.
+    pub(super) all: bool,
+}
 
 /// The order of a frame, and what it holds for.
 pub(super) struct Ordered {
     frame: Frame,
     planes: Vec<[f32; 4]>,
-    by: Order,
-    parts: Parts,
+    asked: Sequencing,
     /// Cells, and entries: one for each part of a cell; and the buffers that they are in, so many in each.
     pub(super) cells: usize,
     pub(super) entries: usize,
@@ -31,15 +37,32 @@ pub(super) struct Ordered {
 }
 
 impl Ordered {
-    pub(super) fn holds_for(&self, seen: &Seen, switches: &Switches, lines: Lines) -> bool {
-        self.frame == seen.frame
-            && self.planes == seen.planes
-            && self.by == switches.order
-            && self.parts == Parts::new(switches, lines)
+    pub(super) fn holds_for(&self, seen: &Seen, asked: Sequencing) -> bool {
+        self.frame == seen.frame && self.planes == seen.planes && self.asked == asked
+    }
+
+    /// Whether it is that of the mesh.
+    pub(super) fn is_of_mesh(&self) -> bool {
+        self.asked.by.rule().is_some()
     }
 }
 
+/// The order of all cells of the mesh, and what it holds for.
+pub(super) struct Sequenced {
+    frame: Frame,
+    rule: Rule,
+    pub(super) cells: Sequence,
+}
+
 impl Project {
+    /// Finds the order of the mesh, unless it is known.
+    pub(super) fn find_sequence(&mut self, geometry: &Geometry, view: &View, seen: &Seen, rule: Rule) {
+        if !self.sequence.as_ref().is_some_and(|s| s.frame == seen.frame && s.rule == rule) {
+            let cells = self.mpvo.sequence(geometry, view, rule);
+            self.sequence = Some(Sequenced { frame: seen.frame, rule, cells });
+        }
+    }
+
     /// Finds the cells that are seen, and sorts them.
     pub(super) fn order<const N: usize>(
         &mut self,
@@ -47,20 +70,17 @@ impl Project {
         seen: &Seen,
         geometry: &Geometry,
         values: &Values<N>,
-        switches: &Switches,
-        lines: Lines,
+        asked: Sequencing,
     ) -> Result<Ordered> {
-        let (cells, by) = (geometry.cells.len(), switches.order);
+        let (cells, Sequencing { by, parts, .. }) = (geometry.cells.len(), asked);
         if cells > 1 << PART {
             let what = format!("the projection engine draws {} cells at most, not {cells}", 1 << PART);
             return Err(Error::Render(format!("{what}; the engine \"traverse\" draws more")));
         }
-        let parts = Parts::new(switches, lines);
         let ordered = |cells, entries, chunk, chunks| Ordered {
             frame: seen.frame,
             planes: seen.planes.clone(),
-            by,
-            parts,
+            asked,
             cells,
             entries,
             chunk,
@@ -77,11 +97,16 @@ impl Project {
             return Ok(ordered(entries, entries, usize::MAX, vec![order]));
         }
         let bins = &self.function.as_ref().ok_or_else(unprepared)?.ends;
-        let keys = keys::keys(geometry, values, bins, seen, by, parts);
-        let order = depth::order(&keys, by != Order::None).entries;
+        let keys = keys::keys(geometry, values, bins, seen, asked);
+        let order = match self.sequence.as_ref().filter(|_| by.rule().is_some()) {
+            Some(sequence) => sequence.cells.order(&keys),
+            None => depth::order(&keys, by != Order::None),
+        };
+        let order = order.entries;
         let cells = keys.into_par_iter().filter(|&key| key != HIDDEN).count();
-        let chunks = order.chunks(ORDER_CHUNK).map(|part| Buffer::holding(&self.gpu, "order", part, Usage::STORAGE));
-        Ok(ordered(cells, order.len(), ORDER_CHUNK, chunks.collect::<Result<_>>()?))
+        let chunks =
+            order.chunks(self.order_chunk).map(|part| Buffer::holding(&self.gpu, "order", part, Usage::STORAGE));
+        Ok(ordered(cells, order.len(), self.order_chunk, chunks.collect::<Result<_>>()?))
     }
 
     /// The keys of all cells, on the device.

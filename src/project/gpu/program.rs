@@ -14,6 +14,7 @@ use crate::integral::Lookup;
 use crate::order::PART;
 use crate::order::depth::HIDDEN;
 use crate::project::{Compositing, Fragments, Switches, Thickness};
+use crate::view::Blend;
 use wgpu::ShaderStages as Stages;
 
 const SHARED: &str = include_str!("../../../shaders/project.wgsl");
@@ -31,6 +32,28 @@ const INTERPOLATED: [&str; 2] = [
     include_str!("../../../shaders/project_interpolated.wgsl"),
     include_str!("../../../shaders/project_interpolated_draw.wgsl"),
 ];
+
+/// What a fragment is: light; or the larger of its two values, and a depth that rises with it. Of the value's bits, in a sequence
+/// that ascends, 29 fit between 0 and 1.
+const BLENDED: &str = "struct Fragment { @location(0) color: vec4f }
+fn fragment_of(front: Value, back: Value, length: f32, words: Words, at: vec2f, rank: u32) -> Fragment {
+    return Fragment(quantised(colored(front, back, length, words), at, rank));
+}\n";
+const LARGEST: &str = "struct Fragment { @location(0) values: vec4f, @builtin(frag_depth) depth: f32 }
+fn fragment_of(front: Value, back: Value, length: f32, words: Words, at: vec2f, rank: u32) -> Fragment {
+    let is_front = last_of(front) > last_of(back);
+    let largest = select(back, front, is_front);
+    let bits = bitcast<u32>(last_of(largest));
+    let ascending = select(bits | 0x80000000u, ~bits, (bits >> 31u) == 1u);
+    return Fragment(padded(largest), bitcast<f32>(0x1f800000u + (ascending >> 3u)));
+}\n";
+
+/// How a frame is drawn.
+#[derive(Clone, Copy)]
+pub(super) struct Drawn<'a> {
+    pub(super) switches: &'a Switches,
+    pub(super) blend: Blend,
+}
 
 /// Programs that are kept: edits of the function, and what cuts rays off, go to and fro between some.
 const KEPT: usize = 4;
@@ -56,10 +79,11 @@ impl Project {
         &mut self,
         arrays: &[Array],
         source: String,
-        switches: &Switches,
+        drawn: Drawn,
         layout: Layout,
         format: wgpu::TextureFormat,
     ) -> Result<()> {
+        let Drawn { switches, blend } = drawn;
         let compositing = switches.compositing;
         let same = |p: &Program| p.source == source && p.format == format && p.compositing == compositing;
         if let Some(known) = self.programs.iter().position(same) {
@@ -72,14 +96,14 @@ impl Project {
         let module = raster::module(gpu, "project", &source);
         let cells = raster::pipeline_layout(gpu, &[Some(&self.shared), Some(&array_layout), Some(&self.own)]);
         let drawing = raster::pipeline_layout(gpu, &[Some(&self.shared)]);
-        let blend = wgpu::BlendComponent {
+        let blend = (blend == Blend::Composite).then_some(wgpu::BlendComponent {
             src_factor: wgpu::BlendFactor::One,
             dst_factor: match compositing {
                 Compositing::Over => wgpu::BlendFactor::OneMinusSrcAlpha,
                 Compositing::Additive => wgpu::BlendFactor::One,
             },
             operation: wgpu::BlendOperation::Add,
-        };
+        });
         // The outline of an intersected cell may be no more than that: grown, it need not turn one way.
         let culled = (switches.fragments != Fragments::Intersected).then_some(wgpu::Face::Back);
         let program = Program {
@@ -111,7 +135,7 @@ impl Project {
 pub(super) fn program(
     variant: &Variant,
     association: &str,
-    switches: &Switches,
+    Drawn { switches, blend }: Drawn,
     layout: &Layout,
     table: Option<&Lookup>,
     limits: Limits,
@@ -152,5 +176,6 @@ pub(super) fn program(
     text += &shader::accessors(arrays);
     text += &table::constants(table, limits.plane_per_cell);
     text += &table::declarations(0, 6);
+    text += if blend == Blend::Maximum { LARGEST } else { BLENDED };
     [&text, shader::CELL, shader::INTEGRAL, TABLE, SHARED, LINES, CELLS, records, SHADE, drawing].join("\n")
 }

@@ -1,6 +1,5 @@
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr, reason = "tests")]
 
-use super::ordering::ORDER_CHUNK;
 use super::*;
 use crate::field::{Association, Component, Field, Kind};
 use crate::gpu::raster::Readback;
@@ -64,7 +63,10 @@ fn every_program_is_valid() {
                     let variant = Variant { kind, direct };
                     let arrays = arrays(chunks);
                     let layout = Layout::new(fragments, kind.components(), lines, fragments == Fragments::Intersected);
-                    validated(&program(&variant, association, &switches, &layout, table.as_ref(), limits, &arrays));
+                    for blend in [Blend::Composite, Blend::Maximum] {
+                        let drawn = Drawn { switches: &switches, blend };
+                        validated(&program(&variant, association, drawn, &layout, table.as_ref(), limits, &arrays));
+                    }
                 }
             }
         }
@@ -85,7 +87,7 @@ fn layouts_match_their_rust_twins() {
             let module = validated(&program(
                 &Variant { kind, direct: false },
                 "POINT",
-                &switches,
+                Drawn { switches: &switches, blend: Blend::Composite },
                 &layout,
                 None,
                 Limits::default(),
@@ -209,6 +211,27 @@ fn pictures_do_not_depend_on_who_finds_the_order() {
     }
 }
 
+/// The sequence goes on from one buffer to the next.
+#[test]
+fn orders_of_several_buffers_are_one() {
+    let Some(gpu) = gpu() else { return };
+    let (mut renderer, view) = prepared(Engine::Project, chosen(&gpu), 33, [64, 64]);
+    let everything =
+        TransferFunction::new(vec![(-1.0, [1.0, 0.5, 0.0]), (1.0, [0.0, 0.5, 1.0])], vec![(-1.0, 9.0)], 1.0);
+    renderer.set_transfer(&everything.unwrap());
+    for order in [Order::Mpvo, Order::Depth] {
+        renderer.set_switches(Switches { order, ..Switches::default() });
+        let one = renderer.render(&view, &|_| ()).unwrap();
+        let project = renderer.backend().project().unwrap();
+        project.sort_on_device(false);
+        project.keep_in_chunks_of(BATCH);
+        let several = renderer.render(&view, &|_| ()).unwrap();
+        assert!(renderer.stats().projection.unwrap().drawn_cells > BATCH as u64);
+        assert!(several.compare(&one).unwrap().max < 2e-6, "{order:?}");
+        renderer.backend().project().unwrap().keep_in_chunks_of(BATCH << 6);
+    }
+}
+
 #[test]
 fn a_lost_device_is_survived() {
     let Some(gpu) = gpu() else { return };
@@ -240,6 +263,6 @@ fn ten_million_tetrahedra_are_drawn() {
     let drawn = project.stats().projection.unwrap().drawn_cells;
     let error = got.compare(&want).unwrap();
     eprintln!("{bindings} bindings, {drawn} cells, error {:e}, {:?}", error.max, project.stats());
-    assert!(bindings > 3 && drawn > ORDER_CHUNK as u64);
+    assert!(bindings > 3 && drawn > (BATCH << 6) as u64);
     assert!(error.max < 1e-3);
 }

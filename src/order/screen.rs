@@ -1,4 +1,4 @@
-//! Coarse: what a frame does once for all points, cells and boundary faces. Points are projected, and each cell is dealt to the
+//! The screen: what a frame does once for all points, cells and boundary faces. Points are projected, and each cell is dealt to the
 //! tiles of the image whose pixel centres its outline may hold.
 //!
 //! In a perspective view p − eye = w (d₀ + X d₁ + Y d₂): w is the depth along the view direction, (X, Y) the place on the image in
@@ -15,37 +15,37 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Width and height of a tile in pixels.
-pub(super) const TILE: u32 = 32;
+pub(crate) const TILE: u32 = 32;
 
 /// Parts that cells are dealt out in: bits do not depend on the number of threads.
 const PARTS: usize = 64;
 
 /// Depth, in normalised units, in front of which nothing in perspective views is drawn.
-pub(super) const NEAREST: f64 = 1e-7;
+pub(crate) const NEAREST: f64 = 1e-7;
 
 /// How far from its centre, in columns and rows, the ray of a pixel passes: edges of meshes that are aligned with the
 /// view do not run through rays then.
-pub(super) const ASIDE: DVec2 = DVec2::new(1.3e-7, 0.9e-7);
+pub(crate) const ASIDE: DVec2 = DVec2::new(1.3e-7, 0.9e-7);
 
 /// How points become places on the image.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Lens {
+pub(crate) struct Lens {
     origin: DVec3,
     inverse: DMat3,
     direction: [DVec3; 3],
     /// Rays meet in the eye.
-    pub(super) meet: bool,
+    pub(crate) meet: bool,
     /// The depth that keys count from.
-    pub(super) reference: f64,
+    pub(crate) reference: f64,
     /// Columns and rows of pixels.
-    pub(super) size: [u32; 2],
+    pub(crate) size: [u32; 2],
     /// Whether anything but the eye limits rays where the mesh is.
-    pub(super) limited: bool,
+    pub(crate) limited: bool,
 }
 
 impl Lens {
     /// None if the mesh lies behind the eye.
-    pub(super) fn new(geometry: &Geometry, view: &View) -> Option<Self> {
+    pub(crate) fn new(geometry: &Geometry, view: &View) -> Option<Self> {
         let fan = view.fan(geometry.centre, geometry.scale, f64::INFINITY);
         let (origin, direction) = (fan.by_pixel(fan.origin, view.size()), fan.by_pixel(fan.direction, view.size()));
         let meet = view.eye().is_some();
@@ -69,40 +69,40 @@ impl Lens {
     }
 
     /// What h counts from.
-    pub(super) fn origin(&self) -> DVec3 {
+    pub(crate) fn origin(&self) -> DVec3 {
         self.origin
     }
 
     /// h of a point.
     #[inline(always)]
-    pub(super) fn place(&self, p: DVec3) -> DVec3 {
+    pub(crate) fn place(&self, p: DVec3) -> DVec3 {
         self.inverse * (p - self.origin)
     }
 
     /// h of a difference of points.
     #[inline(always)]
-    pub(super) fn turn(&self, d: DVec3) -> DVec3 {
+    pub(crate) fn turn(&self, d: DVec3) -> DVec3 {
         self.inverse * d
     }
 
     /// Rows of the matrix that [`Self::turn`] is.
-    pub(super) fn rows(&self) -> [DVec3; 3] {
+    pub(crate) fn rows(&self) -> [DVec3; 3] {
         [0, 1, 2].map(|k| self.inverse.row(k))
     }
 
     /// Column and row of h.
     #[inline(always)]
-    pub(super) fn pixel(&self, h: DVec3) -> DVec2 {
+    pub(crate) fn pixel(&self, h: DVec3) -> DVec2 {
         if self.meet { h.truncate() / h.z } else { h.truncate() }
     }
 
     /// Whether columns, rows and depth are a left-handed system.
-    pub(super) fn mirrored(&self) -> bool {
+    pub(crate) fn mirrored(&self) -> bool {
         self.inverse.determinant() < 0.0
     }
 
     /// The key of a depth.
-    pub(super) fn key(&self, w: f64) -> f64 {
+    pub(crate) fn key(&self, w: f64) -> f64 {
         match self.meet {
             true if w <= 0.0 => f64::NEG_INFINITY,
             true => self.reference - self.reference * (self.reference / w),
@@ -111,7 +111,7 @@ impl Lens {
     }
 
     /// The depth of a key: the inverse of [`Self::key`].
-    pub(super) fn depth(&self, key: f64) -> f64 {
+    pub(crate) fn depth(&self, key: f64) -> f64 {
         match self.meet {
             true if key >= self.reference => f64::INFINITY,
             true => self.reference * (self.reference / (self.reference - key)),
@@ -120,12 +120,12 @@ impl Lens {
     }
 
     /// The length of the ray at a column and row for each unit of depth.
-    pub(super) fn length(&self, column: f64, row: f64) -> f64 {
+    pub(crate) fn length(&self, column: f64, row: f64) -> f64 {
         self.stretch(column, row)[0].sqrt()
     }
 
     /// The square of that length at columns and rows (x, y) from there: of 1, x, y, x², y², x y.
-    pub(super) fn stretch(&self, column: f64, row: f64) -> [f64; 6] {
+    pub(crate) fn stretch(&self, column: f64, row: f64) -> [f64; 6] {
         let [middle, across, down] = self.direction;
         if !self.meet {
             return [middle.length_squared(), 0.0, 0.0, 0.0, 0.0, 0.0];
@@ -136,7 +136,7 @@ impl Lens {
     }
 
     /// The keys between which pixel (`i`, `j`) is drawn.
-    pub(super) fn limits(&self, geometry: &Geometry, view: &View, i: u32, j: u32) -> [f64; 2] {
+    pub(crate) fn limits(&self, geometry: &Geometry, view: &View, i: u32, j: u32) -> [f64; 2] {
         let ray = view.ray(i, j);
         if ray.t_min >= ray.t_max {
             return [f64::INFINITY, f64::NEG_INFINITY];
@@ -151,20 +151,20 @@ impl Lens {
     }
 
     /// Number of tiles in a row and in all.
-    pub(super) fn tiles(&self) -> [usize; 2] {
+    pub(crate) fn tiles(&self) -> [usize; 2] {
         let [columns, rows] = self.size.map(|n| n.div_ceil(TILE) as usize);
         [columns, columns * rows]
     }
 }
 
 /// First and last column, first and last row of pixels; the first is beyond the last if there are none.
-pub(super) type PixelBox = [u16; 4];
+pub(crate) type PixelBox = [u16; 4];
 
 /// No pixels.
-pub(super) const NONE: PixelBox = [1, 0, 1, 0];
+pub(crate) const NONE: PixelBox = [1, 0, 1, 0];
 
 /// The points of the mesh on the image, in columns and rows; NaN where they are not before the eye.
-pub(super) fn project(lens: &Lens, points: &[DVec3], places: &mut Vec<[f32; 2]>) {
+pub(crate) fn project(lens: &Lens, points: &[DVec3], places: &mut Vec<[f32; 2]>) {
     points
         .par_iter()
         .with_min_len(4096)
@@ -178,7 +178,7 @@ pub(super) fn project(lens: &Lens, points: &[DVec3], places: &mut Vec<[f32; 2]>)
 
 /// The pixels whose centres the outline of a cell or face with these corners may hold.
 #[inline(always)]
-pub(super) fn bounds<const K: usize>(
+pub(crate) fn bounds<const K: usize>(
     lens: &Lens,
     points: &[DVec3],
     places: &[[f32; 2]],
@@ -219,7 +219,7 @@ pub(super) fn bounds<const K: usize>(
 }
 
 /// [`bounds`] of `n` cells or faces.
-pub(super) fn all_bounds<const K: usize>(
+pub(crate) fn all_bounds<const K: usize>(
     lens: &Lens,
     points: &[DVec3],
     places: &[[f32; 2]],
@@ -258,7 +258,7 @@ fn clipped(lens: &Lens, corners: &[DVec3]) -> Option<[[f32; 2]; 2]> {
 
 /// What was dealt to each tile, in ascending order.
 #[derive(Debug, Default)]
-pub(super) struct Dealt {
+pub(crate) struct Dealt {
     parts: Vec<Part>,
 }
 
@@ -271,7 +271,7 @@ struct Part {
 
 impl Dealt {
     /// Deals items to the tiles that their boxes meet.
-    pub(super) fn new(lens: &Lens, boxes: &[PixelBox]) -> Self {
+    pub(crate) fn new(lens: &Lens, boxes: &[PixelBox]) -> Self {
         let [columns, tiles] = lens.tiles();
         let n = boxes.len();
         let parts = (0..PARTS).into_par_iter().map(|k| deal(columns, tiles, n * k / PARTS..n * (k + 1) / PARTS, boxes));
@@ -279,13 +279,13 @@ impl Dealt {
     }
 
     /// The items of tile `t`.
-    pub(super) fn of(&self, t: usize) -> impl Iterator<Item = u32> + '_ {
+    pub(crate) fn of(&self, t: usize) -> impl Iterator<Item = u32> + '_ {
         let range = move |p: &Part| p.start[t] as usize..p.start[t + 1] as usize;
         self.parts.iter().flat_map(move |p| p.items[range(p)].iter().copied())
     }
 
     /// How many items tile `t` has.
-    pub(super) fn len(&self, t: usize) -> usize {
+    pub(crate) fn len(&self, t: usize) -> usize {
         self.parts.iter().map(|p| (p.start[t + 1] - p.start[t]) as usize).sum()
     }
 }
