@@ -360,6 +360,14 @@ fn variants_of_the_projection_engine() {
     );
     assert_eq!((code, err.as_str()), (Some(0), ""));
     assert!(out.contains("polynomial, degree 2") && out.contains("plane per cell"), "{out}");
+    let Ran(code, out, err) =
+        place.run("study cube.vtu --orders-of-cells --out o.png --json o.json --frames 1 --size 24x16");
+    assert_eq!((code, err.as_str()), (Some(0), ""));
+    assert!(out.contains("MPVONC") && out.contains("XMPVO") && out.contains("0 cycles"), "{out}");
+    let study: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(place.path("o.json")).unwrap()).unwrap();
+    let [.., ours] = study["orders"].as_array().unwrap().as_slice() else { panic!("{study}") };
+    assert!(ours["inversions"] == 0 && ours["pairs"].as_u64() > Some(0) && ours["max"].as_f64() < Some(1e-4), "{ours}");
     let forms: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(place.path("forms.json")).unwrap()).unwrap();
     let forms = forms["forms"].as_array().unwrap();
