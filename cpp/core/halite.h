@@ -405,8 +405,8 @@ struct Settings
   /// "auto", "cpu", or a GPU by index, UUID or part of its name.
   std::string device;
   /// "auto": "project" on the CPU, "traverse" on a device for graphics. "traverse": rays walk from cell to cell. "project": cells are
-  /// projected. On the CPU their order is verified in every pixel, and pictures are those of the walk. On a device cells are
-  /// sorted by depth, which is right for some meshes only, and the maximum is refused.
+  /// projected. On the CPU their order is verified in every pixel, and pictures are those of the walk. On a device they are put
+  /// in an order that is right for every pixel, unless cells overlap.
   std::string engine;
   /// See Renderer::setIntegral.
   Integral integral;

@@ -73,7 +73,7 @@ public:
   /**
    * How: "auto" (the default), which is "project" on the CPU and "traverse" on a device for graphics; "traverse", by rays that walk
    * from cell to cell; or "project", which projects cells. On the CPU their order is verified in every pixel, so pictures are those of
-   * the walk. On a device cells are sorted by depth, which is right for some meshes only, and maximum intensity is refused.
+   * the walk. On a device they are put in an order that is right for every pixel, unless cells overlap.
    */
   vtkSetStringMacro(Engine);
   vtkGetStringMacro(Engine);
