@@ -19,7 +19,8 @@ namespace
 // changed while the library is loaded, as other threads may read it later.
 __attribute__((constructor)) void hushMesa()
 {
-  if (!std::getenv("XDG_RUNTIME_DIR"))
+  const char* folder = std::getenv("XDG_RUNTIME_DIR");
+  if (!folder || folder[0] != '/')
   {
     setenv("NODEVICE_SELECT", "1", 0);
   }

@@ -17,8 +17,13 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 
 import numpy as np
+
+if sys.platform == "linux" and not os.environ.get("XDG_RUNTIME_DIR", "").startswith("/"):
+    # Mesa's selection of Vulkan devices asks Wayland, which complains on stderr where there is no session.
+    os.environ.setdefault("NODEVICE_SELECT", "1")
 
 from . import _halite
 from ._halite import Error, __version__

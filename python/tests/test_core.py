@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """Meshes, functions, views and pictures, without VTK."""
 import doctest
+import os
 import pickle
+import subprocess
+import sys
 import threading
 
 import numpy as np
@@ -140,3 +143,16 @@ def test_light_and_widgets(box):
     for a in range(len(looks)):
         assert pictures[a][..., 3].max() > 0.1
         assert all(np.abs(pictures[a] - p).max() > 0.01 for p in pictures[:a])
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="it is Mesa that complains")
+def test_nothing_is_said_where_no_desktop_is():
+    code = ("import halite; points = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]\n"
+            "mesh = halite.Mesh.from_arrays(points, [0, 1, 2, 3], [0, 4], [10], point_data={'s': [0, 1, 2, 3]})\n"
+            "try: halite.Renderer(mesh, device='0')\n"
+            "except halite.Error: print('there is no device')")
+    for folder in (None, "", "relative"):
+        env = {k: v for k, v in os.environ.items() if k not in ("XDG_RUNTIME_DIR", "NODEVICE_SELECT")}
+        run = subprocess.run([sys.executable, "-c", code], capture_output=True,
+                             env=env if folder is None else {**env, "XDG_RUNTIME_DIR": folder})
+        assert run.returncode == 0 and not run.stderr, (folder, run.stderr.decode())

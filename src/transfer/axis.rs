@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 
 /// Pieces between two knots on a logarithmic axis, at most.
-const MOST_PIECES: f64 = 256.0;
+const MOST_PIECES: f64 = 1024.0;
 
 /// A range of scalars, and what is even on it.
 #[derive(Debug, Clone, Copy, PartialEq)]

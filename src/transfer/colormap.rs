@@ -12,6 +12,8 @@ use crate::error::{Error, Result};
 pub struct ColorMap {
     points: Vec<(f64, [f64; 3])>,
     opacity: Option<Vec<(f64, f64)>>,
+    /// How far knots may be off where an axis makes more of them.
+    tolerance: f64,
     /// Whether places are of the values' logarithms.
     log: bool,
 }
@@ -50,13 +52,13 @@ impl ColorMap {
                 ))
             })?,
         };
-        let map = ColorMap { points, opacity: None, log: false };
+        let map = ColorMap { points, opacity: None, tolerance: TOLERANCE_NAMED, log: false };
         Ok(if reversed { map.reversed() } else { map })
     }
 
     /// One colour, whose components are in [0, 1].
     pub fn solid(color: [f64; 3]) -> Self {
-        ColorMap { points: vec![(0.0, color), (1.0, color)], opacity: None, log: false }
+        ColorMap { points: vec![(0.0, color), (1.0, color)], opacity: None, tolerance: TOLERANCE_NAMED, log: false }
     }
 
     /// The map from its end to its beginning; so is the opacity that came with it.
@@ -64,7 +66,7 @@ impl ColorMap {
         fn turned<T: Copy>(points: &[(f64, T)]) -> Vec<(f64, T)> {
             points.iter().rev().map(|&(x, v)| (1.0 - x, v)).collect()
         }
-        ColorMap { points: turned(&self.points), opacity: self.opacity.as_deref().map(turned), log: self.log }
+        ColorMap { points: turned(&self.points), opacity: self.opacity.as_deref().map(turned), ..*self }
     }
 
     /// The points `(place in [0, 1], [r, g, b])`, ascending.
@@ -91,7 +93,20 @@ impl ColorMap {
 
     /// The knots of a colour function that has this map over a range of scalars; see [`Self::axis`].
     pub fn over(&self, range: [f64; 2]) -> Vec<(f64, [f64; 3])> {
-        self.axis(range).knots(&self.points, TOLERANCE)
+        self.on(&self.axis(range))
+    }
+
+    /// The knots of a colour function that has this map on `axis`: within 1e-4 of a preset's colours, also by logarithms,
+    /// and within 1/255 of those of a map with a name.
+    pub fn on(&self, axis: &Axis) -> Vec<(f64, [f64; 3])> {
+        axis.knots(&self.points, self.tolerance)
+    }
+
+    /// The knots of the opacity function that came with a preset, on `axis`: within 1e-4 of its largest opacity.
+    pub fn opacity_on(&self, axis: &Axis) -> Option<Vec<(f64, f64)>> {
+        let knots = self.opacity()?;
+        let largest = knots.iter().fold(0.0, |most, k| k.1.max(most));
+        Some(axis.knots(knots, self.tolerance * largest))
     }
 }
 

@@ -1,6 +1,7 @@
 //! What is refused, in which words; and what becomes of large pictures where there is little memory.
 
 use super::{Place, Ran, SCENE};
+use assert_cmd::Command;
 
 /// `-1` is a value of every option that takes one, and is refused as such.
 #[test]
@@ -157,5 +158,23 @@ fn memory_runs_out_with_a_word() {
         let (code, err) = limited(kilobytes, "render cube.vtu --out y.npy --device cpu --size 256x256 --threads 2");
         assert!(matches!(code, Some(0 | 1 | 127)), "{kilobytes}: {code:?}: {err}");
         assert!(code != Some(1) || err.contains("halite: "), "{kilobytes}: {err}");
+    }
+}
+
+/// Mesa's selection of devices complains where there is no desktop session, or none that it can find.
+#[cfg(target_os = "linux")]
+#[test]
+fn nothing_is_said_where_no_desktop_is() {
+    for folder in [None, Some(""), Some("relative"), Some("/nowhere")] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_halite"));
+        command.args(["info", "--devices"]).env_remove("HALITE_DEVICE");
+        // Cargo's configuration sets this one for tests.
+        command.env_remove("NODEVICE_SELECT").env_remove("XDG_RUNTIME_DIR");
+        if let Some(folder) = folder {
+            command.env("XDG_RUNTIME_DIR", folder);
+        }
+        let output = command.output().unwrap();
+        assert!(output.status.success(), "{folder:?}");
+        assert_eq!(String::from_utf8(output.stderr).unwrap(), "", "{folder:?}");
     }
 }

@@ -7,8 +7,8 @@ use halite::transfer::Axis;
 use halite::transfer::colormap::ColorMap;
 use std::path::Path;
 
-/// How far knots may be off on a logarithmic axis: below what 8 bits show.
-const TOLERANCE: f64 = 1.0 / 255.0;
+/// How far knots may be off on a logarithmic axis; opacities, of the largest.
+const TOLERANCE: f64 = 1e-4;
 
 /// A colour map by name, or from `FILE.json` or `FILE.json:NAME`; with `_r` behind the name, reversed.
 pub(crate) fn color_map(text: &str) -> Result<ColorMap> {
@@ -49,9 +49,9 @@ pub(crate) fn restyled(options: &Request, mut scene: Scene, map: Option<ColorMap
     let moves = last > first && (options.log || options.range.is_some());
     let place = |s: f64| (s - first) / (last - first);
     let most = |knots: &[(f64, f64)]| TOLERANCE * knots.iter().fold(0.0, |most, k| k.1.max(most));
-    let opacity = match (&options.opacity, map.as_ref().and_then(ColorMap::opacity)) {
+    let opacity = match (&options.opacity, map.as_ref().and_then(|map| map.opacity_on(&axis))) {
         (Some(o), _) => o.on(&axis, TOLERANCE),
-        (None, Some(o)) => axis.knots(o, most(o)),
+        (None, Some(knots)) => knots,
         (None, None) if moves => {
             let places: Vec<_> = old.opacity().iter().map(|&(s, a)| (place(s), a)).collect();
             axis.knots(&places, most(&places))
@@ -59,7 +59,7 @@ pub(crate) fn restyled(options: &Request, mut scene: Scene, map: Option<ColorMap
         (None, None) => old.opacity().to_vec(),
     };
     let color = match map {
-        Some(map) => axis.knots(map.points(), TOLERANCE),
+        Some(map) => map.on(&axis),
         None if moves => {
             let places: Vec<_> = old.color().iter().map(|&(s, c)| (place(s), c)).collect();
             axis.knots(&places, TOLERANCE)

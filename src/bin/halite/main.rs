@@ -25,6 +25,7 @@ use anyhow::Result;
 use clap::{ArgAction, CommandFactory, FromArgMatches, Parser, Subcommand};
 use halite::gpu::DeviceChoice;
 use halite::render::Renderer;
+use std::path::Path;
 use std::process::ExitCode;
 
 /// Draws unstructured grids as volumes: every pixel is the integral of the field that the mesh defines.
@@ -94,7 +95,7 @@ fn numbers_are_values(command: clap::Command) -> clap::Command {
 /// Mesa's selection of devices asks Wayland, which complains on stderr where there is no session.
 #[allow(unsafe_code, reason = "set_var is unsafe where other threads run; here none does yet")]
 fn hush_mesa() {
-    if std::env::var_os("XDG_RUNTIME_DIR").is_none() {
+    if std::env::var_os("XDG_RUNTIME_DIR").is_none_or(|folder| !Path::new(&folder).is_absolute()) {
         // SAFETY: the process has one thread.
         unsafe { std::env::set_var("NODEVICE_SELECT", "1") }
     }

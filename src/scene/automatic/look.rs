@@ -27,8 +27,11 @@ const OPACITY: f64 = 0.62;
 /// Unit distances in the length of the mean ray.
 const UNITS: f64 = 10.0;
 
-/// How far knots may be off on a logarithmic axis: below what 8 bits show.
+/// How far opacities that nobody said may be off on a logarithmic axis, of the largest: below what 8 bits show.
 const TOLERANCE: f64 = 1.0 / 255.0;
+
+/// How far those may be off that somebody said.
+const TOLERANCE_SAID: f64 = 1e-4;
 
 /// Decades that a range on a logarithmic axis has at most when nobody says it: 32-bit floats tell no more apart.
 const DECADES: i32 = 6;
@@ -250,7 +253,7 @@ pub(super) fn transfer(
     let color = match field.kind() {
         // Its colours are its own.
         Kind::Rgba => vec![(0.0, [1.0; 3])],
-        Kind::Scalar | Kind::Pair => axis.knots(map.points(), TOLERANCE),
+        Kind::Scalar | Kind::Pair => map.on(&axis),
     };
     // Of a pair, or of RGBA, another component drives the opacity.
     let opacity_axis = match field.kind() {
@@ -263,8 +266,8 @@ pub(super) fn transfer(
     };
     let unit = wishes.unit_distance.unwrap_or_else(|| rounded(sample.depth / UNITS));
     let said = match &wishes.opacity {
-        Some(said) => Some(said.on(&opacity_axis, TOLERANCE)),
-        None => map.opacity().map(|knots| opacity_axis.knots(knots, TOLERANCE * largest(knots))),
+        Some(said) => Some(said.on(&opacity_axis, TOLERANCE_SAID)),
+        None => map.opacity_on(&opacity_axis),
     };
     let mut opacity = match (&said, wishes.blend, field.kind()) {
         (Some(knots), _, _) => knots.clone(),

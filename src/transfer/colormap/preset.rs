@@ -37,6 +37,9 @@ const KNOWN: [&str; 26] = [
     "ShowIndexedColorActiveValues",
 ];
 
+/// How far a preset of logarithms, and its knots on a logarithmic axis, may each be off.
+const TOLERANCE_LOG: f64 = TOLERANCE / 2.0;
+
 /// How far beyond 0 to 1 components of colours may be that were computed.
 const ROUNDING: f64 = 1e-3;
 
@@ -56,7 +59,7 @@ impl ColorMap {
             return Err(Error::unsupported(path, what));
         }
         let broken = |e: serde_json::Error| format!("it is no JSON: line {}, column {}", e.line(), e.column());
-        let list = match serde_json::from_str(text).map_err(|e| malformed(broken(e)))? {
+        let list = match serde_json::from_str(&without_last_commas(text)).map_err(|e| malformed(broken(e)))? {
             Value::Array(list) => list,
             one => vec![one],
         };
@@ -88,14 +91,36 @@ impl ColorMap {
                 tracing::warn!("{}: {what} says {name}: {value}, which Halite does not do", path.display());
             }
         }
-        if let Some(color) = properties.get("NanColor") {
-            tracing::info!(
-                "{}: {what} says NanColor: {color}; NaN is left out, unless the program's --nan-color says a colour",
-                path.display()
-            );
+        for name in ["NanColor", "NanOpacity"] {
+            if let Some(value) = properties.get(name) {
+                let left_out = "NaN is left out, unless the program's --nan-color says a colour";
+                tracing::info!("{}: {what} says {name}: {value}; {left_out}", path.display());
+            }
         }
         Ok(map)
     }
+}
+
+/// JSON without the commas behind the last of a list or an object, which ParaView reads and has in its own file; what is
+/// left stays in its place.
+fn without_last_commas(text: &str) -> String {
+    let mut bytes = text.as_bytes().to_vec();
+    let (mut in_text, mut escaped, mut comma) = (false, false, None);
+    for (i, &byte) in text.as_bytes().iter().enumerate() {
+        match (byte, comma) {
+            _ if in_text => {
+                (in_text, escaped) = (escaped || byte != b'"', !escaped && byte == b'\\');
+            }
+            (b']' | b'}', Some(at)) => {
+                bytes[at] = b' ';
+                comma = None;
+            }
+            (b',', _) => comma = Some(i),
+            (b' ' | b'\t' | b'\r' | b'\n', _) => {}
+            _ => (in_text, comma) = (byte == b'"', None),
+        }
+    }
+    String::from_utf8(bytes).unwrap_or_else(|_| text.to_owned())
 }
 
 /// The colour space of a preset, or the name of one that is not known.
@@ -133,7 +158,13 @@ fn map(properties: &Map<String, Value>, space: Space) -> Result<ColorMap, String
     if let Some((_, [a, ..])) = opacity.iter().flatten().find(|p| p.1[0] < 0.0) {
         return Err(format!("Points: opacities are 0 or more, and one is {a}"));
     }
-    Ok(ColorMap { points: color_points(&colors, space), opacity: opacity.map(|p| opacity_points(&p)), log })
+    let tolerance = if log { TOLERANCE_LOG } else { TOLERANCE };
+    Ok(ColorMap {
+        points: color_points(&colors, space, tolerance),
+        opacity: opacity.map(|p| opacity_points(&p, tolerance)),
+        tolerance: TOLERANCE_LOG,
+        log,
+    })
 }
 
 /// Yes or no, as ParaView writes it; no if there is no such property.
@@ -191,7 +222,7 @@ fn tuples<const N: usize>(list: &[f64], log: bool) -> Result<Vec<(f64, [f64; N])
 /// point's own, as values of cells may ask for.
 const BEHIND: f64 = 1.0 / (1 << 20) as f64;
 
-fn color_points(colors: &[(f64, [f64; 3])], space: Space) -> Vec<(f64, [f64; 3])> {
+fn color_points(colors: &[(f64, [f64; 3])], space: Space, tolerance: f64) -> Vec<(f64, [f64; 3])> {
     let mut points = vec![colors[0]];
     for w in colors.windows(2) {
         let ((x0, a), (x1, b)) = (w[0], w[1]);
@@ -202,7 +233,7 @@ fn color_points(colors: &[(f64, [f64; 3])], space: Space) -> Vec<(f64, [f64; 3])
                 let x = x0 + BEHIND.min((x1 - x0) / 2.0);
                 points.extend([(x, a), (x, b)]);
             }
-            _ => points.extend(resample(x0, x1, TOLERANCE, &|u| space.mix(a, b, u))),
+            _ => points.extend(resample(x0, x1, tolerance, &|u| space.mix(a, b, u))),
         }
     }
     let last = colors[colors.len() - 1];
@@ -214,7 +245,7 @@ fn color_points(colors: &[(f64, [f64; 3])], space: Space) -> Vec<(f64, [f64; 3])
 }
 
 /// Points (opacity, midpoint, sharpness) as VTK's piecewise function means them.
-fn opacity_points(list: &[(f64, [f64; 3])]) -> Vec<(f64, f64)> {
+fn opacity_points(list: &[(f64, [f64; 3])], tolerance: f64) -> Vec<(f64, f64)> {
     let mut points = vec![(list[0].0, list[0].1[0])];
     for w in list.windows(2) {
         let ((x0, [a, middle, sharpness]), (x1, [b, ..])) = (w[0], w[1]);
@@ -227,7 +258,7 @@ fn opacity_points(list: &[(f64, [f64; 3])]) -> Vec<(f64, f64)> {
             // Each half is smooth, and so safe to bisect.
             for (from, to, half) in [(x0, at, 0.0), (at, x1, 0.5)] {
                 let f = |u: f64| [sharpened(a, b, half + u / 2.0, sharpness)];
-                points.extend(resample(from, to, TOLERANCE, &f).into_iter().map(|(x, [a])| (x, a)));
+                points.extend(resample(from, to, tolerance, &f).into_iter().map(|(x, [a])| (x, a)));
             }
         }
         points.push((x1, b));
@@ -345,6 +376,50 @@ mod tests {
         close(at([0.0, 3.0], 1.0), [0.2, 0.3, 1.0], 1e-12);
     }
 
+    /// Every scalar has the colour and opacity that the preset has at its logarithm's place, within 1e-4, in every space.
+    #[test]
+    fn logarithms_are_met_everywhere() {
+        let (blues, opacity) = ([[0.1, 0.2, 0.9], [1.0, 0.8, 0.05]], "1,0,0.3,0.4, 10,2,0.5,0, 1000,0.5,0.5,0");
+        for (name, space) in [
+            ("RGB", Space::Rgb),
+            ("HSV", Space::Hsv { wrap: false }),
+            ("Lab", Space::Lab),
+            ("Diverging", Space::Diverging),
+        ] {
+            let map = preset(&format!(
+                r#"{{"ColorSpace": "{name}", "UseLogScale": 1, "RGBPoints": [1,0.1,0.2,0.9, 1000,1,0.8,0.05], "Points": [{opacity}]}}"#
+            ));
+            let map = map.unwrap();
+            let even = [(0.0, [0.0, 0.3, 0.4]), (1.0 / 3.0, [2.0, 0.5, 0.0]), (1.0, [0.5, 0.5, 0.0])];
+            let even = TransferFunction::new(vec![(0.0, [1.0; 3])], opacity_points(&even, 1e-6), 1.0).unwrap();
+            for range in [[1.0, 1e3], [2e-9, 4e-3], [0.5, 0.6], [1e-30, 1e20]] {
+                let axis = map.axis(range);
+                assert!(axis.is_logarithmic());
+                let f = TransferFunction::new(map.over(range), map.opacity_on(&axis).unwrap(), 1.0).unwrap();
+                for i in 0..=4000 {
+                    let u = f64::from(i) / 4000.0;
+                    let s = axis.scalar(u);
+                    close(f.color_at(s), space.mix(blues[0], blues[1], u), 1.02e-4);
+                    let (got, wanted) = (f.opacity_at(s), even.opacity_at(u));
+                    assert!((got - wanted).abs() <= 2.0 * 1.02e-4, "{range:?} at {u}: {got} is not {wanted}");
+                }
+            }
+        }
+    }
+
+    /// As jsoncpp reads JSON, and so ParaView, whose own file of presets ends with a comma.
+    #[test]
+    fn commas_may_be_last() {
+        let map = preset("[\n{\"Name\": \"a,]\\\",}\", \"RGBPoints\": [0,0,0,0, 1,1,1,1 ,\n],},\n\t]").unwrap();
+        assert_eq!(map.points(), [(0.0, [0.0; 3]), (1.0, [1.0; 3])]);
+        for (text, left) in
+            [("[1,,]", "[1, ]"), ("[,]", "[ ]"), (",", ","), (r#"{"a": "b,]\",}",}"#, r#"{"a": "b,]\",}" }"#)]
+        {
+            assert_eq!(without_last_commas(text), left);
+        }
+        assert!(preset("[1,,]").is_err());
+    }
+
     /// What vtkPiecewiseFunction 9.7 answers.
     #[test]
     fn midpoint_and_sharpness_are_vtks() {
@@ -352,7 +427,7 @@ mod tests {
             r#"{"RGBPoints": [0,0,0,0, 1,1,1,1], "Points": [0,0.1,0.3,0.4, 1,0.9,0.5,0, 2,0,0.5,1, 3,0.5,0.5,0]}"#,
         );
         let map = map.unwrap();
-        let knots = map.axis([0.0, 3.0]).knots(map.opacity().unwrap(), TOLERANCE);
+        let knots = map.opacity_on(&map.axis([0.0, 3.0])).unwrap();
         let f = TransferFunction::new(vec![(0.0, [1.0; 3])], knots, 1.0).unwrap();
         for (s, wanted) in
             [(0.1, 0.100992), (0.3, 0.5), (0.5, 0.847593), (0.9, 0.9), (1.3, 0.63), (2.2, 0.0), (2.7, 0.5)]
