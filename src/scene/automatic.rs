@@ -119,7 +119,7 @@ pub fn solid(mesh: &impl Arrays) -> Result<(Field, ColorMap)> {
 /// [`Error::Transfer`]: crate::Error::Transfer
 pub fn scene(mesh: &Mesh, tetrahedra: &Tetrahedra, scalars: Scalars, field: &Field, wishes: Wishes) -> Result<Scene> {
     let size = wishes.size.unwrap_or(SIZE);
-    let camera = wishes.camera.unwrap_or_else(|| camera(mesh, tetrahedra, size));
+    let camera = wishes.camera.unwrap_or_else(|| camera(mesh, tetrahedra, Some(field), size));
     Ok(Scene {
         gradient_array: None,
         mesh: PathBuf::new(),

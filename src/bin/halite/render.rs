@@ -254,8 +254,9 @@ pub(crate) fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut 
         Some(scene) => look::restyled(options, scene, map)?,
         None => {
             let size = options.size.unwrap_or(automatic::SIZE);
-            let first = automatic::camera(&mesh, &tetrahedra, size);
-            let framed = |camera| automatic::framed(&mesh, &tetrahedra, camera, size);
+            let seen = options.nan_color.is_none().then_some(&field);
+            let first = automatic::camera(&mesh, &tetrahedra, seen, size);
+            let framed = |camera| automatic::framed(&mesh, &tetrahedra, seen, camera, size);
             let wishes = automatic::Wishes {
                 range: options.range,
                 values: steps.values,

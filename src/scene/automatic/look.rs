@@ -326,7 +326,7 @@ mod tests {
         let mesh = generate::demo(6);
         let tetrahedra = Tetrahedra::new(&mesh).unwrap();
         let size = [64, 48];
-        let camera = super::super::camera(&mesh, &tetrahedra, size);
+        let camera = super::super::camera(&mesh, &tetrahedra, None, size);
         let functions: [fn(DVec3) -> f64; 5] = [
             |p| p.x,
             |p| (20.0 * (p.x + p.y)).exp(),
