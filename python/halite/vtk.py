@@ -10,6 +10,7 @@ camera and the depths of that moment and composited. So opaque geometry may stan
 goes under the volume.
 """
 import time
+import weakref
 
 import numpy as np
 
@@ -122,7 +123,8 @@ class Volume(vtkVolume):
         self.GetProperty().SetScalarOpacity(nothing)
         self.GetProperty().ShadeOff()
         self.SetMapper(mapper)
-        mapper.AddObserver("VolumeMapperRenderStartEvent", self._turn)
+        self._turning = None
+        self._hold(True)
         self._follow()
 
     @property
@@ -145,7 +147,8 @@ class Volume(vtkVolume):
         return self._renderer.stats
 
     def add_to(self, renderer):
-        """Adds the volume to a renderer of VTK."""
+        """Adds the volume to a renderer of VTK, also once more: the renderer then keeps it until it is removed."""
+        self._hold(True)
         self._watch(renderer)
         renderer.AddViewProp(self)
 
@@ -190,12 +193,41 @@ class Volume(vtkVolume):
                     return found
         return None
 
+    def _hold(self, strongly):
+        """Has the mapper say when it is its turn. Strongly, the mapper keeps this object alive, which it belongs to."""
+        mapper, turn = self.GetMapper(), self._turn
+        if self._turning is not None:
+            was, observer = self._turning
+            if was == strongly:
+                return
+            mapper.RemoveObserver(observer)
+        if not strongly:
+            method = weakref.WeakMethod(self._turn)
+
+            def turn(*event):
+                alive = method()
+                if alive is not None:
+                    alive(*event)
+
+        self._turning = (strongly, mapper.AddObserver("VolumeMapperRenderStartEvent", turn))
+
+    def _leave(self, renderer):
+        """Lets go of a renderer that the volume was removed from; of no more use to any, it lives while somebody has it."""
+        for observer in self._watched.pop(renderer, ()):
+            renderer.RemoveObserver(observer)
+        self._late.discard(renderer)
+        if not self._watched:
+            self._hold(False)
+
     def _watch(self, renderer):
         if renderer not in self._watched:
             start = renderer.AddObserver("StartEvent", self._start)
             self._watched[renderer] = (start, renderer.AddObserver("EndEvent", self._end))
 
     def _start(self, renderer, _):
+        if not renderer.HasViewProp(self):
+            self._leave(renderer)
+            return
         self._now = renderer
         peels = renderer.GetUseDepthPeeling() and renderer.GetUseDepthPeelingForVolumes()
         if peels and self.GetVisibility() and renderer.HasViewProp(self):
@@ -229,6 +261,7 @@ class Volume(vtkVolume):
         return None
 
     def _turn(self, *_):
+        self._hold(True)
         renderer = self._renderer_of_now()
         # Whoever picks gets what lies behind.
         if renderer is not None and renderer.GetSelector() is None:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """What the tests share: a box whose picture is known in closed form."""
+import os
+
 import numpy as np
 import pytest
 
@@ -51,6 +53,12 @@ def look_at(eye, focus=(0, 0, 0), up=(0, 0, 1)):
     m[:3, :3] = [right, np.cross(back, right), back]
     m[:3, 3] = -m[:3, :3] @ eye
     return m
+
+
+def resident():
+    """Bytes of memory that this process has."""
+    with open("/proc/self/statm") as f:
+        return int(f.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
 @pytest.fixture

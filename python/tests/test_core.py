@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """Meshes, functions, views and pictures, without VTK."""
 import doctest
+import gc
 import os
 import pickle
 import subprocess
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 import halite
-from conftest import chord, lattice, look_at, perspective
+from conftest import chord, lattice, look_at, perspective, resident
 
 
 def test_examples_run():
@@ -106,6 +107,32 @@ def test_threads_take_turns(box, fog):
     [t.start() for t in threads]
     [t.join() for t in threads]
     assert len(pictures) == 4 and all((p == pictures[0]).all() for p in pictures)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is read from /proc")
+def test_memory_is_level(box, fog):
+    points, cells, offsets, types = lattice(20)
+    of_frame, of_mesh = 200 * 150 * 16, points.nbytes
+    renderer = halite.Renderer(box, "s", transfer=fog)
+    view = halite.View((3, -2.5, 2), view_up=(0, 0, 1), size=(200, 150))
+
+    def frames():
+        for i in range(300):
+            renderer.render(view, progress=(lambda share: True) if i % 2 else None)
+
+    def renderers():
+        for _ in range(50):
+            mesh = halite.Mesh.from_arrays(points, cells, offsets, types, point_data={"s": points[:, 0].copy()})
+            halite.Renderer(mesh, "s", threads=2).render(view)
+
+    # The first round fills what is kept; a leak of one frame in ten, or of one mesh in ten, shows in the second.
+    for what, most in ((frames, 30 * of_frame), (renderers, 5 * 8 * of_mesh)):
+        what()
+        gc.collect()
+        before = resident()
+        what()
+        gc.collect()
+        assert resident() - before < most, (what.__name__, resident() - before, most)
 
 
 def test_pickling_says_why_not(box):
