@@ -142,6 +142,9 @@ mod bridge {
         degree: i32,
         alpha: &'a str,
         planes: &'a str,
+        iterations: i32,
+        reconstruction: &'a str,
+        sample_distance: f64,
     }
 
     struct CameraSpec {
@@ -171,6 +174,9 @@ mod bridge {
         planes: &'a [f64],
         /// One window depth per pixel, or none.
         depths: &'a [f32],
+        /// Two coordinates along each axis of a space, and rows of the matrix from there to the world: none, or 22 numbers.
+        crop: &'a [f64],
+        regions: u32,
     }
 
     struct Stats {
@@ -285,7 +291,10 @@ fn new_session(threads: usize, device: &str, engine: &str, log: &Log) -> Result<
 }
 
 fn set_integral(session: &mut Session, spec: IntegralSpec) -> Result<()> {
-    session.guarded(|s| s.set_integral(choice(&spec)?))
+    session.guarded(|s| {
+        s.set_integral(choice(&spec)?)?;
+        s.set_reconstruction(spec.reconstruction, spec.sample_distance)
+    })
 }
 
 /// What the form reads of a specification, and nothing else of it.
@@ -303,7 +312,11 @@ fn choice(spec: &IntegralSpec) -> Result<Choice> {
     if form == Form::Cylindrical {
         choice.planes = named("kind of a cylinder's planes", spec.planes)?;
     }
-    if matches!(form, Form::Polynomial | Form::Auto) {
+    if form == Form::SecondOrder {
+        // What is no count is refused as 0 is.
+        choice.iterations = u32::try_from(spec.iterations).unwrap_or(0);
+    }
+    if matches!(form, Form::Polynomial | Form::SecondOrderPolynomial | Form::Auto) {
         let degree = spec.degree;
         let negative = |_| Error::Render(format!("polynomials have a degree from 1 to 8, and not {degree}"));
         choice.degree = u32::try_from(degree).map_err(negative)?;

@@ -66,6 +66,62 @@ pub struct Field {
     normal: [Normal; 4],
     range: [[f64; 2]; 4],
     second: Option<Arc<Field>>,
+    missing: Option<f64>,
+}
+
+/// How the components of an array drive colour and opacity, how they are mapped at first, and their ranges.
+#[allow(clippy::type_complexity, reason = "three things of one array")]
+fn measured<T: Number>(
+    name: &str,
+    numbers: &[T],
+    n: usize,
+    component: Component,
+) -> Result<(Kind, [Normal; 4], [[f64; 2]; 4])> {
+    if n == 0 || !numbers.len().is_multiple_of(n) {
+        return Err(Error::Field(format!("array \"{name}\" has {} values, in tuples of {n}", numbers.len())));
+    }
+    let kind = match component {
+        Component::Index(i) if i >= n => {
+            return Err(Error::Field(format!("array \"{name}\" has {n} components, so there is no component {i}")));
+        }
+        Component::All => match n {
+            1 => Kind::Scalar,
+            2 => Kind::Pair,
+            4 => Kind::Rgba,
+            _ => {
+                return Err(Error::Field(format!(
+                    "array \"{name}\" has {n} components: choose one of them, or the magnitude"
+                )));
+            }
+        },
+        _ => Kind::Scalar,
+    };
+    let tuples = numbers.len() / n;
+    let value = |tuple: usize, k: usize| match component {
+        Component::Index(i) => numbers[tuple * n + i].to_f64(),
+        Component::Magnitude if n == 1 => numbers[tuple].to_f64().abs(),
+        Component::Magnitude => magnitude(&numbers[tuple * n..(tuple + 1) * n]),
+        Component::All => numbers[tuple * n + k].to_f64(),
+    };
+    let m = kind.components();
+    let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; 4];
+    for (k, r) in range.iter_mut().enumerate().take(m) {
+        *r = (0..tuples)
+            .into_par_iter()
+            .map(|t| value(t, k))
+            .filter(|v| v.is_finite())
+            .fold(|| *r, |r, v| [r[0].min(v), r[1].max(v)])
+            .reduce(|| *r, |a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+        if r[0] > r[1] {
+            return Err(Error::Field(format!("array \"{name}\" holds no finite value")));
+        }
+    }
+    let mut normal = range.map(|r| Normal::new(r[0], r[1]));
+    if kind == Kind::Rgba {
+        // The colour needs no function, only its own scale: bytes are 255ths, anything else is taken as it is.
+        normal[..3].fill(Normal { mid: 0.0, half: T::FULL });
+    }
+    Ok((kind, normal, range))
 }
 
 impl Field {
@@ -110,6 +166,18 @@ impl Field {
         with_values!(&array.values, v => Self::from_slice(&array.name, v, array.components, association, component))
     }
 
+    /// The same of an array that is not needed any more: one of single values is not copied.
+    ///
+    /// # Errors
+    /// As [`Self::from_array`].
+    pub fn taking(array: Array, association: Association, component: Component) -> Result<Self> {
+        if array.components != 1 || component == Component::Magnitude {
+            return Self::from_array(&array, association, component);
+        }
+        let (kind, normal, range) = with_values!(&array.values, v => measured(&array.name, v, 1, component))?;
+        Ok(Field { association, kind, values: Arc::new(array.values), normal, range, second: None, missing: None })
+    }
+
     /// Takes `component` of an array called `name`, whose tuples of `n` numbers lie one after another in `numbers`.
     ///
     /// # Errors
@@ -121,56 +189,29 @@ impl Field {
         association: Association,
         component: Component,
     ) -> Result<Self> {
-        if n == 0 || !numbers.len().is_multiple_of(n) {
-            return Err(Error::Field(format!("array \"{name}\" has {} values, in tuples of {n}", numbers.len())));
-        }
-        let kind = match component {
-            Component::Index(i) if i >= n => {
-                return Err(Error::Field(format!("array \"{name}\" has {n} components, so there is no component {i}")));
-            }
-            Component::All => match n {
-                1 => Kind::Scalar,
-                2 => Kind::Pair,
-                4 => Kind::Rgba,
-                _ => {
-                    return Err(Error::Field(format!(
-                        "array \"{name}\" has {n} components: choose one of them, or the magnitude"
-                    )));
-                }
-            },
-            _ => Kind::Scalar,
-        };
+        let (kind, normal, range) = measured(name, numbers, n, component)?;
         let tuples = numbers.len() / n;
-        let value = |tuple: usize, k: usize| match component {
-            Component::Index(i) => numbers[tuple * n + i].to_f64(),
-            Component::Magnitude if n == 1 => numbers[tuple].to_f64().abs(),
-            Component::Magnitude => magnitude(&numbers[tuple * n..(tuple + 1) * n]),
-            Component::All => numbers[tuple * n + k].to_f64(),
-        };
-        let m = kind.components();
-        let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; 4];
-        for (k, r) in range.iter_mut().enumerate().take(m) {
-            *r = (0..tuples)
-                .into_par_iter()
-                .map(|t| value(t, k))
-                .filter(|v| v.is_finite())
-                .fold(|| *r, |r, v| [r[0].min(v), r[1].max(v)])
-                .reduce(|| *r, |a, b| [a[0].min(b[0]), a[1].max(b[1])]);
-            if r[0] > r[1] {
-                return Err(Error::Field(format!("array \"{name}\" holds no finite value")));
-            }
-        }
-        let mut normal = range.map(|r| Normal::new(r[0], r[1]));
-        if kind == Kind::Rgba {
-            // The colour needs no function, only its own scale: bytes are 255ths, anything else is taken as it is.
-            normal[..3].fill(Normal { mid: 0.0, half: T::FULL });
-        }
         let values = match component {
             Component::Index(i) => T::values((0..tuples).into_par_iter().map(|t| numbers[t * n + i]).collect()),
             Component::All => T::values(numbers.to_vec()),
-            Component::Magnitude => Values::F64((0..tuples).into_par_iter().map(|t| value(t, 0)).collect()),
+            Component::Magnitude => {
+                let length = |t: usize| magnitude(&numbers[t * n..(t + 1) * n]);
+                Values::F64((0..tuples).into_par_iter().map(length).collect())
+            }
         };
-        Ok(Field { association, kind, values: Arc::new(values), normal, range, second: None })
+        Ok(Field { association, kind, values: Arc::new(values), normal, range, second: None, missing: None })
+    }
+
+    /// The field, with a value for what is not finite of it. Grids alone read it: a cell with such a value is drawn as if it had
+    /// this one all over.
+    pub fn with_missing(mut self, value: f64) -> Self {
+        self.missing = Some(value);
+        self
+    }
+
+    /// What stands for values that are not finite, if anything does.
+    pub fn missing(&self) -> Option<f64> {
+        self.missing
     }
 
     /// The field, with `second` as the second variable in the place of its gradient's length.

@@ -256,9 +256,16 @@ impl Grid {
         Ok(self)
     }
 
+    /// Takes the array called `name` of points, or of cells, out of the grid.
+    pub fn take_array(&mut self, name: &str, of_cells: bool) -> Option<Array> {
+        let arrays = if of_cells { &mut self.cell_arrays } else { &mut self.point_arrays };
+        let at = arrays.iter().position(|a| a.name == name)?;
+        Some(arrays.remove(at))
+    }
+
     /// A bit for each cell that is not to be drawn: it is marked as duplicate, refined or hidden, or one of its points as
     /// hidden. None if there is none.
-    pub(crate) fn hidden(&self) -> Option<Vec<u64>> {
+    pub fn hidden(&self) -> Option<Vec<u64>> {
         let ([nx, ny, _], points, [x, y, z]) = (self.size(), ghosts::of_points(&self.point_arrays), self.cells());
         let cells = ghosts::of_cells(&self.cell_arrays);
         if points.is_none() && cells.is_none() {

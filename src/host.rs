@@ -8,6 +8,7 @@ mod tests;
 
 pub use log::{Log, carried};
 
+use crate::cast::{Order, Reconstruction, Sampling};
 use crate::error::{Error, Result};
 use crate::field::Field;
 use crate::gpu::DeviceChoice;
@@ -113,6 +114,27 @@ impl Session {
     pub fn set_integral(&mut self, choice: Choice) -> Result<()> {
         choice.check(choice.size(0))?;
         self.renderer.set_integral(choice);
+        Ok(())
+    }
+
+    /// Rebuilds the fields of regular and rectilinear grids between samples by an order that options know by this name, or
+    /// `exact`ly if it is empty; with samples so many world units apart, or, if that is 0, at the faces of voxels and midway.
+    ///
+    /// # Errors
+    /// [`Error::Render`] if no order is called so, or the distance is negative or not finite.
+    pub fn set_reconstruction(&mut self, order: &str, distance: f64) -> Result<()> {
+        let named = Order::ALL.into_iter().find(|(name, _)| *name == order || order.is_empty());
+        let Some((_, order)) = named else {
+            let known = Order::ALL.map(|(name, _)| name).join(", ");
+            return Err(Error::Render(format!("no reconstruction is called \"{order}\"; there is {known}")));
+        };
+        if !(distance >= 0.0 && distance.is_finite()) {
+            return Err(Error::Render(format!(
+                "samples {distance} apart: they are 0 or more world units from each other"
+            )));
+        }
+        let sampling = if distance > 0.0 { Sampling::Steps(distance) } else { Sampling::Voxels };
+        self.renderer.set_reconstruction(Reconstruction { order, sampling });
         Ok(())
     }
 

@@ -2,8 +2,10 @@
 
 mod answer;
 mod backend;
+mod cropped;
 mod frame;
 mod grid;
+mod largest;
 mod loaded;
 mod neighbours;
 mod prepared;
@@ -76,6 +78,8 @@ pub struct Renderer {
     waits: bool,
     /// The device failed to build a table: others are built on the host.
     host_builds: bool,
+    /// Pixels of largest values are these values.
+    as_values: bool,
     stats: Stats,
 }
 
@@ -136,6 +140,7 @@ impl Renderer {
             key: None,
             waits: true,
             host_builds: false,
+            as_values: false,
             stats: Stats::default(),
         };
         renderer.name_device();
@@ -346,7 +351,7 @@ impl Renderer {
             }
             if stopped.load(Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
-        let image = self.render_or_recover(view, &tell)?;
+        let image = self.render_cropped(view, &tell)?;
         if stopped.load(Relaxed) { Err(Error::Aborted) } else { Ok(image) }
     }
 
@@ -409,6 +414,10 @@ impl Renderer {
                         }
                     }
                 }
+                if choice.form.is_of_second_order() {
+                    let form = choice.form.name();
+                    return Err(Error::Render(format!("{form}: such tables are for regular and rectilinear grids")));
+                }
                 lookup::check(&choice, choice.size(exact.opacity.len()), kind)?;
                 choice.check_function(exact)?;
                 let key = (choice.form != Form::Exact).then(|| {
@@ -447,7 +456,8 @@ impl Renderer {
         // What draws by itself is exact: variants are for those who ask for the projection.
         let none = Switches::default();
         let switches = if self.engine == Engine::Auto { &none } else { &self.switches };
-        let frame = Frame { mesh, field, transfer, exact, table, view, switches, progress };
+        let as_values = self.as_values;
+        let frame = Frame { mesh, field, transfer, exact, table, view, switches, as_values, progress };
         let uploaded = self.backend.gpu().map_or(0, Gpu::uploaded);
         let mut walk = Backend::Walk;
         let backend = if mesh.left_to_walk { &mut walk } else { &mut self.backend };
@@ -470,17 +480,6 @@ impl Renderer {
         self.stay.draw();
         self.build_next(late)?;
         Ok(Image { size: view.size(), pixels })
-    }
-
-    /// Has the table built that a frame was drawn without.
-    fn build_next(&mut self, late: Option<Arc<Key>>) -> Result<()> {
-        let Some(key) = late else { return Ok(()) };
-        self.tables.start(&key, &self.pool)?;
-        if let (true, Some(built), Some(exact)) = (key.on_device, self.tables.ready(&key), &self.exact) {
-            // What fails now fails again in the next frame, which says so.
-            let _ = self.backend.hold(exact, &built.table, false);
-        }
-        Ok(())
     }
 
     /// What the last calls did.

@@ -14,19 +14,23 @@ mod file;
 pub mod missing;
 mod opaque;
 mod reader;
+mod regions;
 mod second;
 
 pub use opaque::Opaque;
 pub use reader::read;
+pub use regions::regions;
 pub use second::widget;
 
+use crate::cast::Reconstruction;
 use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::field::{Association, Component, Field};
+use crate::grid::Grid;
 use crate::memory;
-use crate::mesh::Arrays;
+use crate::mesh::{Array, Arrays};
 use crate::transfer::TransferFunction;
-use crate::view::{Blend, Camera, ClippingPlane, DepthBuffer, DepthKind, View};
+use crate::view::{Blend, Camera, ClippingPlane, Cropping, DepthBuffer, DepthKind, View};
 use glam::DVec2;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -52,6 +56,8 @@ pub struct Scene {
     pub clipping_range: Option<[f64; 2]>,
     /// What all of them keep is seen.
     pub clipping_planes: Vec<ClippingPlane>,
+    /// Some regions alone are seen.
+    pub cropping: Option<Cropping>,
     /// Opaque objects, at which rays end.
     pub opaque: Vec<Opaque>,
     /// A depth image, at which rays end.
@@ -66,6 +72,8 @@ pub struct Scene {
     pub device: Option<Value>,
     /// A form of the ray integral, for the program to choose.
     pub integral: Option<Value>,
+    /// How fields of regular and rectilinear grids are rebuilt along rays.
+    pub reconstruction: Option<Reconstruction>,
     /// The projection engine's switches.
     pub projection: Option<Value>,
 }
@@ -96,6 +104,38 @@ impl Scalars {
             _ => Component::Index(0),
         };
         Field::new(mesh, &self.name, self.association, self.component.unwrap_or(default))
+    }
+
+    /// The same of a grid, with its second variable as [`Self::field_with`] has it. An array of single values moves to the field:
+    /// the grid has it no more.
+    ///
+    /// # Errors
+    /// As [`Self::field_with`].
+    pub fn taken_of(&self, grid: &mut Grid, second: Option<&str>) -> Result<Field> {
+        let second = second.map(|name| {
+            let association = self.field(grid).ok().map(|field| field.association());
+            Scalars { name: name.to_owned(), association, component: None }.field(grid)
+        });
+        let wanted = |a| self.association.is_none_or(|w| w == a);
+        let is_one = |a: &Array| a.name == self.name && a.components == 1;
+        let of_points = wanted(Association::Point) && grid.point_arrays().iter().any(|a| a.name == self.name);
+        let arrays = if of_points { grid.point_arrays() } else { grid.cell_arrays() };
+        let association = if of_points { Association::Point } else { Association::Cell };
+        // Of several components, as of none, what is said of all fields.
+        let plain = matches!(self.component, None | Some(Component::Index(0) | Component::All));
+        if !(wanted(association) && plain && arrays.iter().any(is_one)) {
+            return match second {
+                Some(second) => self.field(grid)?.with_second(second?),
+                None => self.field(grid),
+            };
+        }
+        let array = grid.take_array(&self.name, !of_points);
+        let array = array.ok_or_else(|| Error::Field(format!("there is no array \"{}\"", self.name)))?;
+        let field = Field::taking(array, association, Component::Index(0))?;
+        match second {
+            Some(second) => field.with_second(second?),
+            None => Ok(field),
+        }
     }
 
     /// The same, with the array called `second`, or the magnitude of its vectors, as second variable.
@@ -164,6 +204,9 @@ impl Scene {
             .with_pixel_offset(self.pixel_offset)
             .with_clipping_planes(self.clipping_planes.clone())?
             .with_blend(self.blend);
+        if let Some(cropping) = self.cropping {
+            view = view.with_cropping(cropping);
+        }
         if let Some(range) = self.clipping_range {
             view = view.with_clipping_range(range)?;
         }

@@ -1,7 +1,9 @@
 //! The view: camera, image size, and what limits each ray: clipping range, clipping planes, a depth buffer.
 
+mod cropping;
 mod framing;
 
+pub use cropping::{Cropping, REGIONS};
 pub(crate) use framing::hull_area;
 
 use crate::error::{Error, Result};
@@ -138,6 +140,7 @@ pub struct View {
     pixel_offset: DVec2,
     clipping_range: Option<[f64; 2]>,
     clipping_planes: Vec<ClippingPlane>,
+    cropping: Option<Cropping>,
     depth: Option<DepthBuffer>,
     blend: Blend,
 }
@@ -268,6 +271,7 @@ impl View {
             pixel_offset: DVec2::ZERO,
             clipping_range: None,
             clipping_planes: Vec::new(),
+            cropping: None,
             depth: None,
             blend: Blend::default(),
         }

@@ -239,7 +239,8 @@ void Renderer::setIntegral(const Integral& i)
 {
   Inner::Run(this->Data, [&](bridge::Session& session) {
     bridge::set_integral(
-      session, { str(i.form), i.table, str(i.lengths), str(i.texels), i.degree, str(i.alpha), str(i.planes) });
+      session, { str(i.form), i.table, str(i.lengths), str(i.texels), i.degree, str(i.alpha), str(i.planes), i.iterations,
+                 str(i.reconstruction), i.sampleDistance });
   });
 }
 
@@ -257,6 +258,12 @@ bool Renderer::render(const View& view, float* pixels, const Progress& progress)
     planes.insert(planes.end(), p.origin.begin(), p.origin.end());
     planes.insert(planes.end(), p.normal.begin(), p.normal.end());
   }
+  std::vector<double> crop;
+  if (view.cropping)
+  {
+    crop.assign(view.cropping->planes.begin(), view.cropping->planes.end());
+    crop.insert(crop.end(), view.cropping->placement.begin(), view.cropping->placement.end());
+  }
   // What is called back may change the view.
   const std::vector<float> depths = view.depths;
   const Camera& c = view.camera;
@@ -264,7 +271,8 @@ bool Renderer::render(const View& view, float* pixels, const Progress& progress)
     view.worldToEye.value_or(Matrix{}), view.eyeToClip.value_or(Matrix{}),
     { c.position, c.focalPoint, c.viewUp, c.parallel, c.parallel ? c.parallelScale : c.viewAngle, c.clippingRange[0],
       c.clippingRange[1] },
-    slice("clipping planes", planes.data(), planes.size()), slice("depths", depths.data(), depths.size()) };
+    slice("clipping planes", planes.data(), planes.size()), slice("depths", depths.data(), depths.size()),
+    slice("cropping", crop.data(), crop.size()), view.cropping ? view.cropping->regions : 0 };
   const bridge::Progress tell(progress);
   static float none;
   return Inner::Run(this->Data, [&](bridge::Session& session) {

@@ -345,6 +345,17 @@ struct ClippingPlane
   std::array<double, 3> normal;
 };
 
+/// Two planes across each axis of a space make 27 regions, as vtkVolumeMapper has them, some of which are drawn.
+struct Cropping
+{
+  /// Where the planes are: x, x, y, y, z, z.
+  std::array<double, 6> planes = { 0, 1, 0, 1, 0, 1 };
+  /// Bit x + 3 y + 9 z is that of region (x, y, z), each from 0 to 2; at first the one between all planes is drawn.
+  std::uint32_t regions = 0x0002000;
+  /// From the space of the planes to the world, affine, rows one after another.
+  std::array<double, 16> placement = { 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1 };
+};
+
 /// What to draw, and where from. It holds all that it says, so it may be copied and kept.
 struct View
 {
@@ -356,6 +367,8 @@ struct View
   std::optional<std::array<double, 16>> worldToEye;
   std::optional<std::array<double, 16>> eyeToClip;
   std::vector<ClippingPlane> planes;
+  /// What is drawn is in these regions, if any are named.
+  std::optional<Cropping> cropping;
   /// One depth in [0, 1] for each pixel, as OpenGL has it, at which its ray ends; needs matrices or a clipping range. Empty:
   /// nothing ends rays.
   std::vector<float> depths;
@@ -379,7 +392,8 @@ struct Statistics
 struct Integral
 {
   /// "exact"; "volume", "polynomial" or "cylindrical": a pre-integrated table; or "auto": exact, or a table where
-  /// functions have so many knots that it is faster. Tables are for fields of one component.
+  /// functions have so many knots that it is faster. Tables are for fields of one component. For regular and rectilinear grids that
+  /// are rebuilt by parabolas there are "second-order", a table of slabs of one length, and "second-order-polynomial", of all.
   std::string form;
   /// Texels: values in front, values behind, and lengths of a volume or planes of a cylinder. At least 2 x 2 x 3 in a
   /// volume; as many in front as behind in the others; a multiple of 4 planes; polynomials have as many layers as their
@@ -395,6 +409,13 @@ struct Integral
   std::string alpha;
   /// Of a cylinder, which are read: "two", "one", or "packed" (two, in less memory).
   std::string planes;
+  /// Of "second-order": steps in which a slab is summed.
+  std::int32_t iterations = 64;
+  /// Of regular and rectilinear grids, what stands for the field between samples along rays: "exact" (itself), "2" (parabolas),
+  /// "1" (lines), or rectangles by the middle sample, "0", or the sample at either end, "0-left" and "0-right".
+  std::string reconstruction;
+  /// From sample to sample in world units; 0: at the faces of voxels and midway. Slabs span two steps.
+  double sampleDistance = 0;
 };
 
 /// How a renderer works; fixed once it is made, but for the integral. Empty names mean the first that is said here.

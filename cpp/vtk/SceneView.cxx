@@ -60,3 +60,16 @@ SceneView::SceneView(vtkRenderer* renderer, int width, int height, bool isMaximu
     this->Key << p.origin << p.normal;
   }
 }
+
+void SceneView::Crop(const std::array<double, 6>& planes, int regions, const halite::Renderer::Matrix& placement)
+{
+  this->View.cropping.emplace();
+  this->View.cropping->planes = planes;
+  this->View.cropping->regions = static_cast<std::uint32_t>(regions);
+  this->View.cropping->placement = placement;
+  this->Key << placement << static_cast<double>(regions);
+  for (double plane : planes)
+  {
+    this->Key << plane;
+  }
+}

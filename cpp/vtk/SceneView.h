@@ -7,6 +7,8 @@
 
 #include "halite.h"
 
+#include <array>
+
 VTK_ABI_NAMESPACE_BEGIN
 class vtkPlaneCollection;
 class vtkRenderer;
@@ -19,4 +21,7 @@ struct SceneView
 
   // `width` x `height` rays.
   SceneView(vtkRenderer* renderer, int width, int height, bool isMaximum, vtkPlaneCollection* planes);
+
+  // Has some of the regions between planes of the data drawn, which a volume places.
+  void Crop(const std::array<double, 6>& planes, int regions, const halite::Renderer::Matrix& placement);
 };

@@ -16,6 +16,8 @@
 #include "vtkVolume.h"
 #include "vtkVolumeProperty.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 
@@ -46,6 +48,7 @@ vtkHaliteMapper::vtkHaliteMapper()
   this->SetTableTexels("float");
   this->SetPolynomialAlpha("exponential");
   this->SetCylinderPlanes("two");
+  this->SetReconstruction("exact");
 }
 
 vtkHaliteMapper::~vtkHaliteMapper()
@@ -57,6 +60,7 @@ vtkHaliteMapper::~vtkHaliteMapper()
   this->SetTableTexels(nullptr);
   this->SetPolynomialAlpha(nullptr);
   this->SetCylinderPlanes(nullptr);
+  this->SetReconstruction(nullptr);
   this->SetTransfer2DYAxisArray(nullptr);
 }
 
@@ -175,6 +179,12 @@ void vtkHaliteMapper::Internals::DrawIn(vtkOpenGLRenderWindow* window, vtkRender
     const double distance = pass ? 1 : this->Self.ImageSampleDistance;
     SceneView view(renderer, static_cast<int>(std::ceil(viewport.Width / distance)),
       static_cast<int>(std::ceil(viewport.Height / distance)), isMaximum, this->Self.ClippingPlanes);
+    if (this->Self.Cropping)
+    {
+      std::array<double, 6> planes;
+      std::copy_n(this->Self.CroppingRegionPlanes, 6, planes.begin());
+      view.Crop(planes, this->Self.CroppingRegionFlags, content.Placement);
+    }
     wanted << content.Whole() << view.Key;
     if (this->Failed == wanted)
     {
@@ -328,6 +338,16 @@ void vtkHaliteMapper::PrintSelf(ostream& os, vtkIndent indent)
   {
     os << indent << "Widget: " << widget << "\n";
   }
+  os << indent << "Reconstruction: " << Internals::Text(this->Reconstruction) << "\n";
+  os << indent << "SampleDistance: " << this->SampleDistance << "\n";
+  os << indent << "TableIterations: " << this->TableIterations << "\n";
+  os << indent << "Cropping: " << (this->Cropping ? "On" : "Off") << "\n";
+  os << indent << "CroppingRegionPlanes:";
+  for (double plane : this->CroppingRegionPlanes)
+  {
+    os << " " << plane;
+  }
+  os << "\n" << indent << "CroppingRegionFlags: " << this->CroppingRegionFlags << "\n";
   os << indent << "ImageSampleDistance: " << this->ImageSampleDistance << "\n";
   os << indent << "NumberOfThreads: " << this->NumberOfThreads << "\n";
   os << indent << "UseFloatingPointFrameBuffer: " << (this->UseFloatingPointFrameBuffer ? "On" : "Off") << "\n";

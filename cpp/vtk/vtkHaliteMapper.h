@@ -81,7 +81,8 @@ public:
 
   ///@{
   /**
-   * The form of the ray integral: "exact" (the default); a pre-integrated table, "volume", "polynomial" or "cylindrical"; or
+   * The form of the ray integral: "exact" (the default); a pre-integrated table, "volume", "polynomial" or "cylindrical" (and for a
+   * Reconstruction by parabolas "second-order" or "second-order-polynomial"); or
    * "auto": exact, or a table where a function has so many points that it is faster. Tables are for arrays of which one component
    * or the magnitude is drawn. After an edit of the volume's property frames are exact until the table is built anew, which
    * happens meanwhile; after a change of this or of what follows, the next frame waits for it.
@@ -192,6 +193,52 @@ public:
 
   ///@{
   /**
+   * Of regular and rectilinear grids, what stands for the field between samples along rays: "exact" (itself, the default), "2"
+   * (parabolas, for which there are the tables "second-order", of one length, and "second-order-polynomial", of all), "1" (lines),
+   * "0", "0-left" or "0-right" (rectangles).
+   */
+  vtkSetStringMacro(Reconstruction);
+  vtkGetStringMacro(Reconstruction);
+  ///@}
+
+  ///@{
+  /**
+   * From sample to sample of a reconstruction that takes such, in world units; 0 (the default): at the faces of voxels and midway.
+   */
+  vtkSetClampMacro(SampleDistance, double, 0.0, VTK_DOUBLE_MAX);
+  vtkGetMacro(SampleDistance, double);
+  ///@}
+
+  ///@{
+  /**
+   * Steps in which the slabs of "second-order" are summed; 64 by default.
+   */
+  vtkSetClampMacro(TableIterations, int, 1, 65536);
+  vtkGetMacro(TableIterations, int);
+  ///@}
+
+  ///@{
+  /**
+   * Whether only some of the 27 regions are drawn that two planes across each axis make, as vtkVolumeMapper has them; off by default.
+   * The planes (xmin, xmax, ymin, ymax, zmin, zmax) are in the coordinates of the data, which the volume then moves. Bit x + 3 y + 9 z
+   * of the flags is that of region (x, y, z), each from 0 to 2; at first the one in the middle is drawn.
+   */
+  vtkSetMacro(Cropping, vtkTypeBool);
+  vtkGetMacro(Cropping, vtkTypeBool);
+  vtkBooleanMacro(Cropping, vtkTypeBool);
+  vtkSetVector6Macro(CroppingRegionPlanes, double);
+  vtkGetVectorMacro(CroppingRegionPlanes, double, 6);
+  vtkSetClampMacro(CroppingRegionFlags, int, 0x0, 0x7ffffff);
+  vtkGetMacro(CroppingRegionFlags, int);
+  void SetCroppingRegionFlagsToSubVolume() { this->SetCroppingRegionFlags(0x0002000); }
+  void SetCroppingRegionFlagsToFence() { this->SetCroppingRegionFlags(0x2ebfeba); }
+  void SetCroppingRegionFlagsToInvertedFence() { this->SetCroppingRegionFlags(0x5140145); }
+  void SetCroppingRegionFlagsToCross() { this->SetCroppingRegionFlags(0x0417410); }
+  void SetCroppingRegionFlagsToInvertedCross() { this->SetCroppingRegionFlags(0x7be8bef); }
+  ///@}
+
+  ///@{
+  /**
    * Distance between rays, in pixels: with 2, a fourth of the pixels is computed, and enlarged. 1 by default.
    */
   vtkSetClampMacro(ImageSampleDistance, double, 1.0, 100.0);
@@ -275,6 +322,12 @@ protected:
   char* Transfer2DYAxisArray = nullptr;
   std::vector<std::string> Widgets;
   double SilhouettePower = -1;
+  char* Reconstruction = nullptr;
+  double SampleDistance = 0;
+  int TableIterations = 64;
+  vtkTypeBool Cropping = 0;
+  double CroppingRegionPlanes[6] = { 0, 1, 0, 1, 0, 1 };
+  int CroppingRegionFlags = 0x0002000;
   double ImageSampleDistance = 1.0;
   int NumberOfThreads = 0;
   bool UseFloatingPointFrameBuffer = true;

@@ -153,11 +153,7 @@ void vtkHaliteMapper::Internals::Shade(Content& content, vtkVolume* volume, vtkR
   {
     return;
   }
-  if (content.IsGrid)
-  {
-    this->WarnOnce("Halite draws regular and rectilinear grids without light, gradient opacity and 2D functions yet");
-  }
-  else if (content.Component == halite::AllComponents)
+  if (content.Component == halite::AllComponents)
   {
     this->WarnOnce(
       "dependent components have no gradient: they are drawn without light, gradient opacity and 2D functions");
@@ -188,6 +184,9 @@ Content vtkHaliteMapper::Internals::Choose(vtkDataSet* grid, vtkVolume* volume, 
   integral.degree = this->Self.PolynomialDegree;
   integral.alpha = Text(this->Self.PolynomialAlpha);
   integral.planes = Text(this->Self.CylinderPlanes);
+  integral.iterations = this->Self.TableIterations;
+  integral.reconstruction = Text(this->Self.Reconstruction);
+  integral.sampleDistance = this->Self.SampleDistance;
   int cellFlag = 0;
   vtkDataArray* array = vtkAbstractMapper::GetScalars(
     grid, this->Self.ScalarMode, this->Self.ArrayAccessMode, this->Self.ArrayId, this->Self.ArrayName, cellFlag);

@@ -3,7 +3,7 @@
 //! A packet of neighbouring rays goes from plane to plane ([`walk`]) for some steps; the values at the corners of what they
 //! pass are fetched ([`corners`]); along each ray they make a cubic, in f32 and in the units of the function's knots
 //! ([`lines`]). A ray stays on its line of the function until the cubic's Bernstein coefficients leave that: so nothing is
-//! looked up where no knot is met, and the integral is in closed form but for one sum ([`optics`]). The others are cut
+//! looked up where no knot is met, and the integral is in closed form but for one sum (`integral::cubic::stretch`). The others are cut
 //! where they meet knots ([`cut`]). What f32 has too few digits for, a voxel at a time, [`Exact`] does in f64.
 //!
 //! [`Exact`]: crate::integral::Exact
@@ -15,7 +15,6 @@ mod cut;
 mod lines;
 mod march;
 mod near;
-mod optics;
 mod packet;
 mod passed;
 mod taken;
@@ -59,6 +58,8 @@ pub(super) struct Scene<'a> {
     /// Whether what is fetched are integers, and its map.
     integers: bool,
     map: Map,
+    /// From values that lines are over to those that the field's own map gives: times the first, plus the second.
+    back: [f64; 2],
     least: f32,
     /// The length of equal steps, if there are such.
     step: Option<f64>,
@@ -78,13 +79,15 @@ impl<'a> Scene<'a> {
         if samples.components != 1 || frame.view.blend() != Blend::Composite || uneven {
             return None;
         }
-        if volume.point_count() > u32::MAX as usize {
+        // Lanes hand what is missing to f64, and look up nothing of it.
+        if frame.table.is_some() && samples.missing.is_some() || volume.point_count() > u32::MAX as usize {
             return None;
         }
         let normal: Normal = samples.normal[0];
         let (plain, integers) = kind(&samples.values);
         let lines = Lines::new(exact, normal, plain)?;
         let map = if plain { lines.map } else { Map { mid: 0.0, factor: 1.0 } };
+        let back = [1.0 / (lines.map.factor * normal.half), (lines.map.mid - normal.mid) / normal.half];
         let hides = volume.hidden.is_some();
         let blocks = seen.contains(&false).then(|| (Way::blocks(volume, samples), seen));
         let [row, layer] = samples.stride;
@@ -99,6 +102,7 @@ impl<'a> Scene<'a> {
             rows: [0, row, layer, layer + row],
             integers,
             map,
+            back,
             step,
             least: least_light(exact.direct) as f32,
             pace: if steepest * width > STEEP { FEW } else { STEPS },

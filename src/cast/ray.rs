@@ -2,6 +2,7 @@
 
 use super::lanes;
 use super::reconstruction::{Order, Reconstruction, Sampling};
+use super::tabulated::Tabulated;
 use super::volume::{Samples, Volume};
 use crate::integral::cubic::{Cubic, Piece, trilinear};
 use crate::integral::{Exact, Knots, Light};
@@ -26,6 +27,8 @@ pub(crate) struct Frame<'a> {
     pub(crate) samples: &'a Samples,
     pub(crate) exact: &'a Exact<f64>,
     pub(crate) reconstruction: Reconstruction,
+    /// What is looked up in the place of integrals.
+    pub(crate) table: Option<Tabulated<'a>>,
     pub(crate) view: &'a View,
     /// Turns the largest values along a ray, normalised, into a premultiplied colour for [`Blend::Maximum`].
     pub(crate) pixel: &'a (dyn Fn(&[f64]) -> [f32; 4] + Sync),
@@ -105,6 +108,72 @@ impl Visible {
     }
 }
 
+/// Draws a picture, whose pixels `trace` finds, and adds up what else it counts. What progress does not want any more stays
+/// empty.
+pub(super) fn draw(
+    frame: &Frame,
+    trace: impl Fn(u32, u32) -> ([f32; 4], [u64; 2]) + Sync,
+) -> (Vec<[f32; 4]>, [u64; 2]) {
+    let [w, h] = frame.view.size().map(|n| n as usize);
+    let mut pixels = vec![[0.0; 4]; w * h];
+    let (stopped, counts, done) = (AtomicBool::new(false), [AtomicU64::new(0), AtomicU64::new(0)], AtomicUsize::new(0));
+    pixels.par_chunks_mut(w * BAND).enumerate().for_each(|(band, rows)| {
+        if stopped.load(Relaxed) {
+            return;
+        }
+        let mut own = [0, 0];
+        for (p, pixel) in rows.iter_mut().enumerate() {
+            let (drawn, [first, second]) = trace((p % w) as u32, (band * BAND + p / w) as u32);
+            *pixel = drawn;
+            own = [own[0] + first, own[1] + second];
+        }
+        counts.iter().zip(own).for_each(|(sum, own)| _ = sum.fetch_add(own, Relaxed));
+        let share = (done.fetch_add(rows.len(), Relaxed) + rows.len()) as f64 / (w * h) as f64;
+        if (frame.progress)(share).is_break() {
+            stopped.store(true, Relaxed);
+        }
+    });
+    (pixels, counts.map(AtomicU64::into_inner))
+}
+
+/// Calls `visit` with each voxel that a ray passes between two places of it, and the places where it enters and leaves it, until
+/// that breaks.
+#[inline(always)]
+pub(super) fn for_each_voxel(
+    volume: &Volume,
+    line: &Line,
+    [mut t, end]: [f64; 2],
+    mut visit: impl FnMut([usize; 3], f64, f64) -> ControlFlow<()>,
+) {
+    let (Volume { axes, cells, .. }, Line { o, d }) = (volume, line);
+    let mut at = line.voxel(volume, t);
+    // The plane of each axis that comes next, and where.
+    let plane = |a: usize, at: usize| if d[a] > 0.0 { at + 1 } else { at };
+    let slope = d.map(|d| 1.0 / d);
+    let crossing =
+        |a: usize, at: usize| if d[a] == 0.0 { f64::INFINITY } else { (axes[a][plane(a, at)] - o[a]) * slope[a] };
+    let mut next = [0, 1, 2].map(|a| crossing(a, at[a]));
+    loop {
+        let a = if next[0] <= next[1] && next[0] <= next[2] { 0 } else { 1 + usize::from(next[2] < next[1]) };
+        let to = next[a].min(end);
+        if to > t {
+            if visit(at, t, to).is_break() {
+                return;
+            }
+            t = to;
+        }
+        if next[a] >= end {
+            return;
+        }
+        let behind = if d[a] > 0.0 { at[a] + 1 } else { at[a].wrapping_sub(1) };
+        if behind >= cells[a] {
+            return;
+        }
+        at[a] = behind;
+        next[a] = crossing(a, behind);
+    }
+}
+
 /// Casts the rays of a frame, of a field of `N` components, one by one.
 struct Caster<'a, const N: usize> {
     frame: &'a Frame<'a>,
@@ -122,26 +191,11 @@ struct Gathered<const N: usize> {
 
 impl<const N: usize> Caster<'_, N> {
     fn image(&self) -> (Vec<[f32; 4]>, u64) {
-        let [w, h] = self.frame.view.size().map(|n| n as usize);
-        let mut pixels = vec![[0.0; 4]; w * h];
-        let (stopped, steps, done) = (AtomicBool::new(false), AtomicU64::new(0), AtomicUsize::new(0));
-        pixels.par_chunks_mut(w * BAND).enumerate().for_each(|(band, rows)| {
-            if stopped.load(Relaxed) {
-                return;
-            }
-            let mut own = 0;
-            for (p, pixel) in rows.iter_mut().enumerate() {
-                let gathered = self.trace((p % w) as u32, (band * BAND + p / w) as u32);
-                own += gathered.steps;
-                *pixel = self.finished(&gathered);
-            }
-            steps.fetch_add(own, Relaxed);
-            let share = (done.fetch_add(rows.len(), Relaxed) + rows.len()) as f64 / (w * h) as f64;
-            if (self.frame.progress)(share).is_break() {
-                stopped.store(true, Relaxed);
-            }
+        let (pixels, [steps, _]) = draw(self.frame, |i, j| {
+            let gathered = self.trace(i, j);
+            (self.finished(&gathered), [gathered.steps, 0])
         });
-        (pixels, steps.into_inner())
+        (pixels, steps)
     }
 
     fn finished(&self, gathered: &Gathered<N>) -> [f32; 4] {
@@ -157,46 +211,27 @@ impl<const N: usize> Caster<'_, N> {
 
     /// Follows the ray of pixel (`i`, `j`).
     fn trace(&self, i: u32, j: u32) -> Gathered<N> {
-        let Volume { axes, cells, scale, .. } = self.frame.volume;
         let mut gathered = Gathered { light: Light::none(), largest: None, steps: 0 };
-        let Some((o, d, [mut t, end])) = enter(self.frame, i, j) else { return gathered };
+        let Some((o, d, [t, end])) = enter(self.frame, i, j) else { return gathered };
         if let Reconstruction { order, sampling: Sampling::Steps(step) } = self.frame.reconstruction
             && order != Order::Exact
         {
             self.march(&Line { o, d }, [t, end], step, &mut gathered);
             return gathered;
         }
-        let mut at = Line { o, d }.voxel(self.frame.volume, t);
-        // The plane of each axis that comes next, and where.
-        let plane = |a: usize, at: usize| if d[a] > 0.0 { at + 1 } else { at };
-        let slope = d.map(|d| 1.0 / d);
-        let crossing =
-            |a: usize, at: usize| if d[a] == 0.0 { f64::INFINITY } else { (axes[a][plane(a, at)] - o[a]) * slope[a] };
-        let mut next = [0, 1, 2].map(|a| crossing(a, at[a]));
-        loop {
-            let a = if next[0] <= next[1] && next[0] <= next[2] { 0 } else { 1 + usize::from(next[2] < next[1]) };
-            let to = next[a].min(end);
-            if to > t {
-                gathered.steps += 1;
-                if self.seen[self.frame.samples.block(at)] {
-                    let place = |t: f64| Line { o, d }.place(self.frame.volume, at, t);
-                    self.voxel(at, place(t), place(to), (to - t) * scale, &mut gathered);
-                    if gathered.light.through < least_light(self.frame.exact.direct) {
-                        return gathered;
-                    }
+        let (volume, line) = (self.frame.volume, Line { o, d });
+        for_each_voxel(volume, &line, [t, end], |at, t, to| {
+            gathered.steps += 1;
+            if self.seen[self.frame.samples.block(at)] {
+                let place = |t: f64| line.place(volume, at, t);
+                self.voxel(at, place(t), place(to), (to - t) * volume.scale, &mut gathered);
+                if gathered.light.through < least_light(self.frame.exact.direct) {
+                    return ControlFlow::Break(());
                 }
-                t = to;
             }
-            if next[a] >= end {
-                return gathered;
-            }
-            let behind = if d[a] > 0.0 { at[a] + 1 } else { at[a].wrapping_sub(1) };
-            if behind >= cells[a] {
-                return gathered;
-            }
-            at[a] = behind;
-            next[a] = crossing(a, behind);
-        }
+            ControlFlow::Continue(())
+        });
+        gathered
     }
 
     /// Adds what lies in a voxel between two places of its unit cube, `length` apart.
@@ -251,9 +286,17 @@ impl<const N: usize> Caster<'_, N> {
 
     /// Adds what stands for the field between the samples of a slab.
     fn slab(&self, order: Order, samples: &[[f64; 3]; N], length: f64, gathered: &mut Gathered<N>) {
-        for part in 0..order.parts() {
+        let parts = order.parts();
+        if let (Some(table), Blend::Composite, [samples]) = (&self.frame.table, self.frame.view.blend(), &samples[..]) {
+            for part in 0..parts {
+                let [r, g, b, alpha] = table.part(*samples, part, length / parts as f64).map(f64::from);
+                gathered.light.add([r, g, b], alpha);
+            }
+            return;
+        }
+        for part in 0..parts {
             let cubics = samples.map(|s| order.part(part, s));
-            self.add(&cubics, length / order.parts() as f64, gathered);
+            self.add(&cubics, length / parts as f64, gathered);
         }
     }
 
@@ -319,9 +362,9 @@ impl<const N: usize> Caster<'_, N> {
 }
 
 /// A ray o + t d in coordinates along the axes.
-struct Line {
-    o: [f64; 3],
-    d: [f64; 3],
+pub(super) struct Line {
+    pub(super) o: [f64; 3],
+    pub(super) d: [f64; 3],
 }
 
 impl Line {
@@ -335,7 +378,7 @@ impl Line {
 
     /// Where in the unit cube of a voxel it is at `t`.
     #[inline(always)]
-    fn place(&self, volume: &Volume, at: [usize; 3], t: f64) -> DVec3 {
+    pub(super) fn place(&self, volume: &Volume, at: [usize; 3], t: f64) -> DVec3 {
         let along = |a: usize| (self.o[a] + self.d[a] * t - volume.axes[a][at[a]]) * volume.inverse[a][at[a]];
         DVec3::from_array([0, 1, 2].map(|a| along(a).clamp(0.0, 1.0)))
     }

@@ -75,9 +75,23 @@ impl Volume {
         self.hidden.as_ref().is_some_and(|bits| bits.get(c / 64).is_some_and(|word| word >> (c % 64) & 1 == 1))
     }
 
+    /// The middle of the grid, in world coordinates.
+    pub(crate) fn centre(&self) -> DVec3 {
+        self.centre
+    }
+
     /// From corner to corner, in world units.
     pub(crate) fn diagonal(&self) -> f64 {
         self.diagonal
+    }
+
+    /// The longest way through a voxel, in world units.
+    pub(crate) fn longest_chord(&self) -> f64 {
+        let width = |a: usize| self.inverse[a].iter().fold(0.0, |most: f64, i| most.max(1.0 / i));
+        let [x, y, z] = [width(0), width(1), width(2)];
+        let to_world = self.to_axes.inverse();
+        let along = |(y, z): (f64, f64)| (to_world * DVec3::new(x, y, z)).length();
+        [(y, z), (-y, z), (y, -z), (-y, -z)].map(along).into_iter().fold(0.0, f64::max)
     }
 
     /// Number of voxels.
@@ -114,6 +128,8 @@ pub(crate) struct Samples {
     pub(super) components: usize,
     pub(super) of_cells: bool,
     pub(super) normal: [Normal; 4],
+    /// What stands for values that are not finite, normalised: all over their voxels.
+    pub(super) missing: Option<f64>,
     /// Points along x, and in a layer of x and y: what corners of a voxel are apart.
     pub(super) stride: [usize; 2],
     /// Blocks along each axis.
@@ -140,6 +156,7 @@ impl Samples {
             components,
             of_cells,
             normal: [0, 1, 2, 3].map(|k| field.normal(k)),
+            missing: field.missing().map(|v| field.normal(0).apply(v)),
             stride: [row, row * volume.axes[1].len()],
             blocks: volume.cells.map(|n| (n >> BLOCK) + usize::from(n & ((1 << BLOCK) - 1) > 0)),
             bounds: vec![],
@@ -187,7 +204,8 @@ impl Samples {
     /// Component `k` of cell `c`, normalised.
     #[inline(always)]
     pub(super) fn of_cell(&self, c: usize, k: usize) -> f64 {
-        self.normal[k].apply(self.values.get(c * self.components + k))
+        let value = self.normal[k].apply(self.values.get(c * self.components + k));
+        self.missing.filter(|_| !value.is_finite()).unwrap_or(value)
     }
 
     /// Component `k` at the corners of voxel (i, j, k), normalised; x fastest, then y.
@@ -211,7 +229,11 @@ impl Samples {
             let v = &v[first..=first + at[7]];
             at.map(|i| v[i] as f64)
         });
-        raw.map(|s| (s - mid) * factor)
+        let values = raw.map(|s| (s - mid) * factor);
+        match self.missing {
+            Some(missing) if !values.iter().all(|v| v.is_finite()) => [missing; 8],
+            _ => values,
+        }
     }
 
     /// Bytes held.

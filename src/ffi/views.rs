@@ -2,8 +2,8 @@
 
 use super::bridge::{CameraSpec, ViewSpec};
 use super::rows;
-use crate::error::Result;
-use crate::view::{Blend, Camera, ClippingPlane, DepthBuffer, DepthKind, Projection, View};
+use crate::error::{Error, Result};
+use crate::view::{Blend, Camera, ClippingPlane, Cropping, DepthBuffer, DepthKind, Projection, View};
 use glam::DVec3;
 
 /// The view that a specification describes.
@@ -21,6 +21,14 @@ pub(super) fn view(spec: &ViewSpec) -> Result<View> {
     let vectors =
         |p: &[f64; 6]| ClippingPlane { origin: DVec3::new(p[0], p[1], p[2]), normal: DVec3::new(p[3], p[4], p[5]) };
     let view = view.with_blend(blend).with_clipping_planes(spec.planes.as_chunks().0.iter().map(vectors).collect())?;
+    let view = match *spec.crop {
+        [] => view,
+        [a, b, c, d, e, f, ref matrix @ ..] => {
+            let matrix = matrix.try_into().map_err(|_| Error::View("a cropping without its matrix".into()))?;
+            view.with_cropping(Cropping::new([[a, b], [c, d], [e, f]], spec.regions, rows(matrix))?)
+        }
+        _ => return Err(Error::View("a cropping without six planes".into())),
+    };
     if spec.depths.is_empty() {
         return Ok(view);
     }

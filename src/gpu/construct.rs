@@ -170,6 +170,7 @@ impl Plan {
             Stored::Volume(t) => Plan::volume(exact, t.kind, t.size, t.longest, Construction::Closed),
             Stored::Polynomial(t) => Plan::polynomial(t.degree, t.size, t.longest),
             Stored::Cylindrical(t) => Plan::cylindrical(t.planes, t.size, t.longest),
+            Stored::SecondOrder(_) | Stored::SecondOrderPolynomial(_) => None,
         }
     }
 }

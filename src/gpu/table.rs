@@ -55,6 +55,8 @@ pub(crate) fn constants(table: Option<&Lookup>, per_cell: bool) -> String {
         },
         Some(Stored::Polynomial(_)) => "POLYNOMIAL",
         Some(Stored::Cylindrical(_)) => "CYLINDRICAL",
+        // Devices have no slabs of three samples yet, and refuse their tables.
+        Some(Stored::SecondOrder(_) | Stored::SecondOrderPolynomial(_)) => "EXACT",
     };
     let choice = table.map(|t| *t.choice()).unwrap_or_default();
     text += &format!(
@@ -132,6 +134,10 @@ impl Held {
     }
 }
 
+fn no_slabs() -> Error {
+    Error::Device("devices have no tables of second order: the CPU's ray caster of grids reads them".into())
+}
+
 /// Whether `gpu` is to build the tables of `choice` itself, rather than be handed them.
 pub(crate) fn builds(gpu: &Gpu, choice: &Choice) -> bool {
     let wanted = match choice.build {
@@ -196,6 +202,7 @@ impl OnDevice {
                     writer.write(layers, tiles.corner(tile), tiles.tile, &texels, &ranges[0])?;
                 }
             }
+            Stored::SecondOrder(_) | Stored::SecondOrderPolynomial(_) => return Err(no_slabs()),
         }
         Ok(on_device)
     }
@@ -228,6 +235,7 @@ impl OnDevice {
                     copy(&mut encoder, &built, tile * h, layers, tiles.corner(tile), [w, h, 1]);
                 }
             }
+            Stored::SecondOrder(_) | Stored::SecondOrderPolynomial(_) => return Err(no_slabs()),
         }
         gpu.queue.submit([encoder.finish()]);
         gpu.check()?;
@@ -259,6 +267,7 @@ impl OnDevice {
                 parameters.tiles = tiles.parameters();
                 layered(tiles.size())?
             }
+            Stored::SecondOrder(_) | Stored::SecondOrderPolynomial(_) => return Err(no_slabs()),
         };
         Self::new(gpu, volume, layers, parameters)
     }

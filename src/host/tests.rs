@@ -130,7 +130,7 @@ fn unknown_names_are_refused_with_those_that_exist() {
     assert!(message.contains("magic") && message.contains("traverse") && message.contains("project"), "{message}");
     assert!(Session::new(1, "cpu", "project", Log::default()).is_ok());
     let message = named::<Form>("integral", "guess").unwrap_err().to_string();
-    let known = "\"auto\", \"exact\", \"volume\", \"polynomial\", \"cylindrical\"";
+    let known = "\"auto\", \"exact\", \"volume\", \"polynomial\", \"cylindrical\", \"second-order\", \"second-order-polynomial\"";
     assert_eq!(message, format!("no integral is called \"guess\"; there are {known}"));
 }
 

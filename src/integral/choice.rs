@@ -1,7 +1,7 @@
 //! Which form of the ray-segment integral draws.
 
 use super::Exact;
-use super::table::Kind;
+use super::table::{Kind, MOST_OF_ALL_LENGTHS};
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 
@@ -16,8 +16,10 @@ pub struct Choice {
     /// Texels: values in front, values behind, and lengths of a volume or planes of a cylinder; those of polynomials
     /// are their degree's. Values in front and behind are as many but for volumes. Without: [`Choice::size`].
     pub table: Option<[u32; 3]>,
-    /// Of polynomials, from 1 to 8: Guthe et al. (2002) have 1, 2 and 4.
+    /// Of polynomials, from 1 to 8: Guthe et al. (2002) have 1, 2 and 4. Those of slabs have 4 at most.
     pub degree: u32,
+    /// Steps in which slabs of second order are summed: El Hajjar et al. (2008) have 8 to 256, and find 64 enough.
+    pub iterations: u32,
     /// How polynomials' opacity depends on the length.
     pub alpha: Alpha,
     /// How a cylinder's planes are stored and read.
@@ -38,6 +40,7 @@ impl Default for Choice {
             lengths: Kind::default(),
             table: None,
             degree: 2,
+            iterations: 64,
             alpha: Alpha::default(),
             planes: Planes::default(),
             per_cell: false,
@@ -63,21 +66,32 @@ pub enum Form {
     Polynomial,
     /// A table of three parameters that projected cells need a plane of: [`super::table::Cylindrical`].
     Cylindrical,
+    /// Of slabs of a grid between three samples, of one length: [`super::table::SecondOrder`].
+    SecondOrder,
+    /// The same for all lengths: [`super::table::SecondOrderPolynomial`].
+    SecondOrderPolynomial,
 }
 
 impl Form {
     /// All, by the names that they have in scenes.
-    pub const ALL: [(&'static str, Form); 5] = [
+    pub const ALL: [(&'static str, Form); 7] = [
         ("auto", Form::Auto),
         ("exact", Form::Exact),
         ("volume", Form::Volume),
         ("polynomial", Form::Polynomial),
         ("cylindrical", Form::Cylindrical),
+        ("second-order", Form::SecondOrder),
+        ("second-order-polynomial", Form::SecondOrderPolynomial),
     ];
 
     /// The name that it has in scenes.
     pub fn name(self) -> &'static str {
         Form::ALL.into_iter().find(|f| f.1 == self).map_or("", |f| f.0)
+    }
+
+    /// Whether it is of slabs along which the value is a parabola.
+    pub fn is_of_second_order(self) -> bool {
+        matches!(self, Form::SecondOrder | Form::SecondOrderPolynomial)
     }
 }
 
@@ -169,6 +183,9 @@ impl Choice {
         match (self.form, self.table) {
             (Form::Polynomial, Some([front, ..])) => [front, front, self.degree + 1],
             (Form::Polynomial, None) => [values(512, 1024), values(512, 1024), self.degree + 1],
+            (Form::SecondOrder | Form::SecondOrderPolynomial, Some([n, m, 0])) if n == m => [n; 3],
+            (Form::SecondOrder, None) => [256; 3],
+            (Form::SecondOrderPolynomial, None) => [64; 3],
             (_, Some(table)) => table,
             (Form::Cylindrical, None) => [256; 3],
             (_, None) if self.lengths == Kind::Uniform => [256, 256, 64],
@@ -187,8 +204,10 @@ impl Choice {
     /// [`Error::Render`] for direct emission that is nearly opaque somewhere, if the table has colours over what is seen
     /// of a length: that is nearly nothing there, and rounding of one texel is more than all of its neighbour.
     pub fn check_function(&self, exact: &Exact<f32>) -> Result<()> {
-        let is_normalised =
-            self.form == Form::Polynomial || self.form == Form::Volume && self.lengths == Kind::LogNormalised;
+        let is_normalised = match self.form {
+            Form::Polynomial | Form::SecondOrderPolynomial => true,
+            form => form == Form::Volume && self.lengths == Kind::LogNormalised,
+        };
         if !is_normalised || !exact.direct || exact.opacity.steepest() <= OPAQUE_TEXEL {
             return Ok(());
         }
@@ -222,6 +241,16 @@ impl Choice {
             Form::Cylindrical if front != back || front < 2 || depth == 0 || !depth.is_multiple_of(4) => {
                 Some("a cylindrical table has as many texels for values in front as behind, at least 2, and a multiple of 4 planes".to_owned())
             }
+            Form::SecondOrder | Form::SecondOrderPolynomial if front < 2 || back != front || depth != front => {
+                Some("a table of second order has as many texels along each axis, at least 2".to_owned())
+            }
+            Form::SecondOrderPolynomial if front > MOST_OF_ALL_LENGTHS => {
+                Some(format!("a table of second order for all lengths has at most {MOST_OF_ALL_LENGTHS} texels along each axis"))
+            }
+            Form::SecondOrderPolynomial if !(1..=4).contains(&self.degree) => {
+                Some(format!("polynomials of slabs have a degree from 1 to 4, and not {}", self.degree))
+            }
+            Form::SecondOrder if self.iterations == 0 => Some("a slab is summed in 1 step at least".to_owned()),
             _ => None,
         };
         let bytes = Choice::bytes(size);
@@ -280,7 +309,10 @@ mod tests {
         assert_eq!(Choice::of(Form::Cylindrical).size(3), [256; 3]);
         let own = Choice { table: Some([8, 9, 10]), ..Choice::of(Form::Volume) };
         assert_eq!(own.size(200), [8, 9, 10]);
-        for form in [Form::Volume, Form::Polynomial, Form::Cylindrical] {
+        assert_eq!(Choice::of(Form::SecondOrder).size(3), [256; 3]);
+        let small = Choice { table: Some([32, 32, 0]), ..Choice::of(Form::SecondOrderPolynomial) };
+        assert_eq!(small.size(3), [32; 3]);
+        for (_, form) in Form::ALL {
             let choice = Choice::of(form);
             choice.check(choice.size(1_000_000)).unwrap();
         }
@@ -301,5 +333,9 @@ mod tests {
         refused(Form::Polynomial, [1, 64, 0], 2, "2 x 2");
         refused(Form::Cylindrical, [64, 64, 6], 2, "multiple of 4");
         refused(Form::Cylindrical, [64, 32, 8], 2, "as many");
+        refused(Form::SecondOrder, [64, 64, 32], 2, "along each axis");
+        refused(Form::SecondOrder, [512, 512, 512], 2, "bytes");
+        refused(Form::SecondOrderPolynomial, [256, 256, 256], 2, "at most 128");
+        refused(Form::SecondOrderPolynomial, [8, 8, 8], 5, "from 1 to 4");
     }
 }

@@ -7,6 +7,7 @@
 //! cubic.
 
 mod piece;
+pub(crate) mod stretch;
 
 pub(crate) use piece::Piece;
 

@@ -120,18 +120,18 @@ impl<R: Real> Knots<R> {
         self.value.iter().fold(R::of(0.0), |most, v| most.max(v[0]))
     }
 
-    /// How much extinction varies at most over a stretch of values `width` wide.
-    pub(crate) fn variation(&self, width: R) -> R {
+    /// How much channel `k` varies at most over a stretch of values `width` wide.
+    pub(crate) fn variation(&self, k: usize, width: R) -> R {
         let mut most = R::of(0.0);
         for (i, &s) in self.s.iter().enumerate() {
             // The extremes of a piecewise linear function are at knots and at the stretch's ends; one end may be taken to be
             // at a knot.
             for [from, to] in [[s, s + width], [s - width, s]] {
-                let (mut low, mut high) = (self.value[i][0], self.value[i][0]);
+                let (mut low, mut high) = (self.value[i][k], self.value[i][k]);
                 let mut take = |v: R| (low, high) = (low.min(v), high.max(v));
-                let inside = self.s.iter().zip(&self.value).filter(|(k, _)| from <= **k && **k <= to);
-                inside.for_each(|(_, v)| take(v[0]));
-                [from, to].into_iter().for_each(|end| take(self.color_at(end, 0)));
+                let inside = self.s.iter().zip(&self.value).filter(|(s, _)| from <= **s && **s <= to);
+                inside.for_each(|(_, v)| take(v[k]));
+                [from, to].into_iter().for_each(|end| take(self.color_at(end, k)));
                 most = most.max(high - low);
             }
         }

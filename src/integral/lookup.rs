@@ -1,10 +1,16 @@
 //! Tables as engines read them: in 32 bits, with texels rounded to what a device stores.
 
+mod texels;
+
 use super::choice::{Alpha, Choice, Form, Planes, Texels};
-use super::table::{Cylindrical, Kind, Polynomial, Table, length, mix};
+use super::table::{
+    Cylindrical, Kind, Polynomial, SecondOrder, SecondOrderPolynomial, Slabs, Table, length, mix, parabola,
+};
 use super::{Exact, Light, opacity_of_depth, table};
 use crate::error::{Error, Result};
 use crate::field;
+pub(crate) use texels::Range;
+use texels::{between, bilinear, from_zero, greatest, trilinear, with_density, within};
 
 /// What bounds the error of a uniform volume whose size nobody said, where a table of 256 x 256 x 128 can hold that. It
 /// is the worst case, some 10 times what is seen.
@@ -25,13 +31,8 @@ pub(crate) enum Stored {
     Volume(Table),
     Polynomial(Polynomial),
     Cylindrical(Cylindrical),
-}
-
-/// What texels between 0 and 1 stand for, channel by channel: so much, and so much more for each.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Range {
-    pub(crate) least: [f32; 4],
-    pub(crate) span: [f32; 4],
+    SecondOrder(SecondOrder),
+    SecondOrderPolynomial(SecondOrderPolynomial),
 }
 
 /// The integral of segments by a table.
@@ -69,6 +70,14 @@ impl Lookup {
             Form::Volume => Table::closed(exact, choice.lengths, [front, back, depth], longest).map(Stored::Volume),
             Form::Polynomial => Polynomial::closed(exact, choice.degree, front, longest).map(Stored::Polynomial),
             Form::Cylindrical => Cylindrical::closed(exact, depth, front, longest).map(Stored::Cylindrical),
+            Form::SecondOrder => {
+                let in_bytes = choice.texels == Texels::Unorm8;
+                let build = if in_bytes { SecondOrder::published_in_bytes } else { SecondOrder::published };
+                build(exact, front, longest, choice.iterations).map(Stored::SecondOrder)
+            }
+            Form::SecondOrderPolynomial => {
+                SecondOrderPolynomial::closed(exact, choice.degree, front, longest).map(Stored::SecondOrderPolynomial)
+            }
             Form::Auto | Form::Exact => None,
         };
         Self::of(exact, choice, stored)
@@ -93,6 +102,14 @@ impl Lookup {
                 t.rebuild(exact);
                 Stored::Polynomial(t)
             }
+            Stored::SecondOrder(mut t) => {
+                t.rebuild(exact);
+                Stored::SecondOrder(t)
+            }
+            Stored::SecondOrderPolynomial(mut t) => {
+                t.rebuild(exact);
+                Stored::SecondOrderPolynomial(t)
+            }
             Stored::Cylindrical(_) => return Self::new(exact, choice, longest),
         };
         Self::of(exact, choice, Some(stored))
@@ -116,7 +133,7 @@ impl Lookup {
             Form::Cylindrical => {
                 Some(Stored::Cylindrical(Cylindrical { planes: depth, size: front, longest, texels: vec![] }))
             }
-            Form::Auto | Form::Exact => None,
+            Form::Auto | Form::Exact | Form::SecondOrder | Form::SecondOrderPolynomial => None,
         };
         let choice = Choice { texels: Texels::Float, ..*choice };
         Ok(Lookup { source: Some(Box::new(exact.clone())), ..Self::of(exact, &choice, stored)? })
@@ -128,6 +145,8 @@ impl Lookup {
             Stored::Volume(t) if t.kind != Kind::Uniform => length(t.kind, t.size[2], t.longest, 1),
             Stored::Volume(Table { longest, .. })
             | Stored::Polynomial(Polynomial { longest, .. })
+            | Stored::SecondOrder(SecondOrder { length: longest, .. })
+            | Stored::SecondOrderPolynomial(SecondOrderPolynomial { longest, .. })
             | Stored::Cylindrical(Cylindrical { longest, .. }) => *longest,
         };
         let inverse = (1.0 / unit) as f32;
@@ -154,13 +173,18 @@ impl Lookup {
                 let colour = r.max(g).max(b);
                 vec![(from_zero([colour, colour, colour, 1.0]), &mut t.texels)]
             }
+            Stored::SecondOrder(SecondOrder { texels: Slabs::Float(texels), .. }) => {
+                let of = if levels > 0.0 { greatest(texels) } else { [1.0; 4] };
+                vec![(from_zero([of[0], of[1], of[2], 1.0]), &mut texels[..])]
+            }
+            // Bytes are what they are.
+            Stored::SecondOrder(_) => vec![],
             // Coefficients may be negative.
             Stored::Polynomial(t) => {
-                let mut parts: Vec<_> = t.texels.iter_mut().map(|t| (within(t), &mut t[..])).collect();
-                if let (Some((range, _)), Some(most)) = (parts.first_mut(), density) {
-                    (range.least[3], range.span[3]) = (0.0, most);
-                }
-                parts
+                with_density(t.texels.iter_mut().map(|t| (within(t), &mut t[..])).collect(), density)
+            }
+            Stored::SecondOrderPolynomial(t) => {
+                with_density(t.texels.iter_mut().map(|t| (within(t), &mut t[..])).collect(), density)
             }
         };
         for (range, texels) in parts {
@@ -197,9 +221,14 @@ impl Lookup {
                     (0..).zip(slices).skip(1).for_each(|(k, s)| take(s, length(t.kind, t.size[2], t.longest, k)));
                     t.greatest()[3]
                 }
-                Stored::Polynomial(t) => {
-                    let first = t.texels.first()?;
-                    (0..8).for_each(|k| take(first, t.longest * f64::from(-k).exp2()));
+                Stored::Polynomial(Polynomial { longest, .. })
+                | Stored::SecondOrderPolynomial(SecondOrderPolynomial { longest, .. }) => {
+                    let first = match &self.stored {
+                        Stored::Polynomial(t) => &t.texels.first()?[..],
+                        Stored::SecondOrderPolynomial(t) => &t.texels.first()?[..],
+                        _ => return None,
+                    };
+                    (0..8).for_each(|k| take(first, longest * f64::from(-k).exp2()));
                     greatest(first)[3]
                 }
                 _ => return None,
@@ -242,6 +271,17 @@ impl Lookup {
             Stored::Volume(t) => t.size,
             Stored::Polynomial(t) => [t.size, t.size, t.degree + 1],
             Stored::Cylindrical(t) => [t.size, t.size, t.planes],
+            Stored::SecondOrder(SecondOrder { size, .. })
+            | Stored::SecondOrderPolynomial(SecondOrderPolynomial { size, .. }) => [*size; 3],
+        }
+    }
+
+    /// Bytes of its texels, as they are held here or on a device of 32-bit floats.
+    pub fn bytes(&self) -> u64 {
+        match &self.stored {
+            Stored::SecondOrder(t) => t.bytes(),
+            Stored::SecondOrderPolynomial(t) => t.bytes(),
+            _ => Choice::bytes(self.size()),
         }
     }
 
@@ -251,6 +291,8 @@ impl Lookup {
             Stored::Volume(t) => t.longest,
             Stored::Polynomial(t) => t.longest,
             Stored::Cylindrical(t) => t.longest,
+            Stored::SecondOrder(t) => t.length,
+            Stored::SecondOrderPolynomial(t) => t.longest,
         }
     }
 
@@ -305,7 +347,39 @@ impl Lookup {
                 let low = (at as usize).min(t.planes as usize - 1);
                 mix(plane(low), plane(low + 1), at - low as f32)
             }
+            // A line is the parabola through its middle.
+            Stored::SecondOrder(_) | Stored::SecondOrderPolynomial(_) => {
+                self.look_up_slab([front, (front + back) * 0.5, back], length)
+            }
         }
+    }
+
+    /// The same of a slab along which the value is the parabola through three samples, by a table of such; of its one
+    /// length, or of a line from end to end by other tables.
+    pub fn look_up_slab(&self, samples: [f32; 3], length: f32) -> [f32; 4] {
+        let [front, _, back] = samples;
+        match &self.stored {
+            Stored::SecondOrder(t) => trilinear(|i| t.texels.get(i), t.size, samples),
+            Stored::SecondOrderPolynomial(t) => {
+                let x = (length * self.inverse).min(1.0);
+                let mut sum = [0.0; 4];
+                for texels in t.texels.iter().rev() {
+                    let c = trilinear(|i| texels[i], t.size, samples);
+                    sum = [sum[0] * x + c[0], sum[1] * x + c[1], sum[2] * x + c[2], c[3]];
+                }
+                self.reconstructed(sum, length)
+            }
+            _ => self.look_up(front, back, length),
+        }
+    }
+
+    /// Premultiplied colour and opacity of a slab as [`Self::look_up_slab`]; beyond ±1, as it is integrated.
+    pub(crate) fn slab(&self, exact: &Exact<f64>, samples: [f64; 3], length: f64) -> [f32; 4] {
+        let narrow = samples.map(|s| s as f32);
+        if narrow.iter().all(|s| s.abs() <= WITHIN) {
+            return self.look_up_slab(narrow, length as f32);
+        }
+        parabola(exact, samples, length).map(|v| v as f32)
     }
 
     /// Colour and opacity of a segment, from its colour over what is seen of it and its mean extinction.
@@ -385,50 +459,6 @@ pub fn check(choice: &Choice, size: [u32; 3], kind: field::Kind) -> Result<()> {
         return Err(Error::Render("tables are for fields of one component; use the exact integral".into()));
     }
     choice.check(size)
-}
-
-impl Range {
-    /// A texel in units of this.
-    pub(crate) fn share(&self, texel: [f32; 4]) -> [f32; 4] {
-        std::array::from_fn(|k| ((texel[k] - self.least[k]) / self.span[k]).clamp(0.0, 1.0))
-    }
-
-    fn value(&self, share: [f32; 4]) -> [f32; 4] {
-        std::array::from_fn(|k| share[k] * self.span[k] + self.least[k])
-    }
-}
-
-fn from_zero(greatest: [f32; 4]) -> Range {
-    Range { least: [0.0; 4], span: greatest.map(|v| v.max(f32::MIN_POSITIVE)) }
-}
-
-fn greatest(texels: &[[f32; 4]]) -> [f32; 4] {
-    texels.iter().fold([f32::MIN_POSITIVE; 4], |m, t| std::array::from_fn(|k| m[k].max(t[k])))
-}
-
-/// The range of each channel.
-fn within(texels: &[[f32; 4]]) -> Range {
-    let first = texels.first().copied().unwrap_or_default();
-    let least = texels.iter().fold(first, |m, t| std::array::from_fn(|k| m[k].min(t[k])));
-    let most = texels.iter().fold(first, |m, t| std::array::from_fn(|k| m[k].max(t[k])));
-    Range { least, span: std::array::from_fn(|k| (most[k] - least[k]).max(f32::MIN_POSITIVE)) }
-}
-
-/// The first of the two texels of `n` that a place in [0, 1] is between, and the share of the second.
-#[inline(always)]
-fn between(x: f32, n: u32) -> (usize, f32) {
-    let at = x.clamp(0.0, 1.0) * (n - 1) as f32;
-    let low = (at as u32).min(n - 2);
-    (low as usize, at - low as f32)
-}
-
-#[inline(always)]
-fn bilinear(texels: &[[f32; 4]], width: u32, (i, u): (usize, f32), (j, v): (usize, f32)) -> [f32; 4] {
-    let row = |j: usize| {
-        let at = j * width as usize + i;
-        mix(texels[at], texels[at + 1], u)
-    };
-    mix(row(j), row(j + 1), v)
 }
 
 #[cfg(test)]

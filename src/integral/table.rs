@@ -2,7 +2,7 @@
 //!
 //! Each form is judged by the exact integral, and read here as a device's linear filter reads it: [`Table`] has all
 //! three parameters, [`Polynomial`] the values only, and [`Cylindrical`] planes of two parameters that hold a projected
-//! cell each. [`SecondOrder`] and [`SecondOrderPolynomial`] are for slabs along which the value is a parabola.
+//! cell each. [`SecondOrder`], [`SecondOrderLengths`] and [`SecondOrderPolynomial`] are for slabs along which the value is a parabola.
 
 mod bound;
 mod closed;
@@ -21,7 +21,9 @@ pub use cylindrical::Cylindrical;
 pub use linear::Linear;
 pub use polynomial::Polynomial;
 pub use sampled::{Sampling, Steps};
-pub use second_order::{SecondOrder, SecondOrderPolynomial, parabola};
+pub use second_order::{
+    MOST_OF_ALL_LENGTHS, MOST_OF_ONE_LENGTH, SecondOrder, SecondOrderLengths, SecondOrderPolynomial, Slabs, parabola,
+};
 pub use storage::Storage;
 pub use volume::{Kind, Table, coordinate, length};
 

@@ -1,15 +1,23 @@
 //! Frames of regular and rectilinear grids: by the ray caster, on the CPU, whatever the renderer's engine and device are.
 
+mod second;
+
+use super::largest::Largest;
+use super::tables::Key;
 use super::{Progress, Renderer, ms};
-use crate::cast::{self, Reconstruction, Samples, Volume};
+use crate::cast::tabulated::{self, Tabulated};
+use crate::cast::{self, Order, Reconstruction, Samples, Sampling, Volume};
 use crate::error::{Error, Result};
+use crate::field::normal::Chooser;
 use crate::field::{Field, Kind, Normal};
 use crate::gpu::Part;
 use crate::grid::Grid;
 use crate::image::Image;
-use crate::integral::{Exact, Form};
+use crate::integral::{Choice, Exact, Form, lookup};
 use crate::transfer::TransferFunction;
-use crate::view::View;
+use crate::view::{Blend, View};
+use second::Extra;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// The grid that is drawn.
@@ -22,11 +30,15 @@ pub(super) struct LoadedGrid {
 /// The field that is drawn of it.
 #[derive(Debug)]
 struct OnGrid {
-    kind: Kind,
+    field: Field,
     normal: [Normal; 4],
     samples: Samples,
+    /// How values are mapped for tables.
+    chooser: Chooser,
     /// The transfer function for it, once a frame needed that.
     exact: Option<Exact<f64>>,
+    /// What frames with a second variable, or light, need.
+    extra: Extra,
 }
 
 impl LoadedGrid {
@@ -34,20 +46,41 @@ impl LoadedGrid {
     pub(super) fn forget_function(&mut self) {
         if let Some(field) = &mut self.field {
             field.exact = None;
+            field.extra.forget_function();
         }
     }
 }
 
 impl OnGrid {
-    /// The pixel of a ray whose largest values are `v`: colour and opacity there, premultiplied.
-    fn largest(&self, transfer: &TransferFunction, v: &[f64]) -> [f32; 4] {
-        let own = |k: usize| self.normal[k].invert(v[k]);
-        let [r, g, b] = match self.kind {
-            Kind::Rgba => [v[0], v[1], v[2]].map(|c| c.clamp(0.0, 1.0)),
-            Kind::Scalar | Kind::Pair => transfer.color_at(own(0)),
+    fn kind(&self) -> Kind {
+        self.field.kind()
+    }
+
+    /// What is needed of a table; nothing for the integral itself.
+    fn key(
+        &mut self,
+        choice: &Choice,
+        transfer: &TransferFunction,
+        how: Reconstruction,
+        volume: &Volume,
+    ) -> Result<Option<Key>> {
+        if matches!(choice.form, Form::Auto | Form::Exact) {
+            return Ok(None);
+        }
+        self.chooser.choose(transfer, true);
+        let own = Exact::new(transfer, self.kind(), self.chooser.normal(), volume.scale);
+        lookup::check(choice, choice.size(own.opacity.len()), self.kind())?;
+        choice.check_function(&Exact::new(transfer, self.kind(), self.chooser.normal(), volume.scale))?;
+        let slab = match how.sampling {
+            Sampling::Voxels => volume.longest_chord(),
+            Sampling::Steps(step) => 2.0 * step,
         };
-        let a = transfer.opacity_at(own(v.len() - 1)).min(1.0);
-        [r * a, g * a, b * a, a].map(|c| c as f32)
+        let longest = volume.scale * if how.order == Order::One { slab / 2.0 } else { slab };
+        Ok(Some(Key { exact: own, choice: *choice, longest, on_device: false }))
+    }
+
+    fn largest<'a>(&'a self, transfer: &'a TransferFunction, as_values: bool) -> Largest<'a> {
+        Largest { kind: self.kind(), normal: &self.normal, transfer, as_values }
     }
 }
 
@@ -75,7 +108,21 @@ impl Renderer {
 
     /// Rebuilds the field of a grid another way along rays from now on; nothing to meshes.
     pub fn set_reconstruction(&mut self, reconstruction: Reconstruction) {
-        self.reconstruction = reconstruction;
+        if self.reconstruction != reconstruction {
+            (self.reconstruction, self.key) = (reconstruction, None);
+            self.waits = self.integral.form != Form::Auto;
+        }
+    }
+
+    /// Gives pixels that hold largest values the colours and opacities of these.
+    pub(super) fn color(&self, image: &mut Image) {
+        let Some(transfer) = &self.transfer else { return };
+        let largest = match (&self.grid, &self.field) {
+            (Some(LoadedGrid { field: Some(field), .. }), _) => field.largest(transfer, false),
+            (None, Some(field)) => Largest { kind: field.kind(), normal: field.normal(), transfer, as_values: false },
+            _ => return,
+        };
+        image.pixels.iter_mut().for_each(|p| *p = largest.of_values(*p));
     }
 
     /// What draws grids.
@@ -92,7 +139,11 @@ impl Renderer {
         let samples = self.pool.install(|| Samples::new(&grid.volume, field))?;
         self.stats.device_bytes = grid.volume.bytes() + samples.bytes();
         let normal = [0, 1, 2, 3].map(|k| field.normal(k));
-        grid.field = Some(OnGrid { kind: field.kind(), normal, samples, exact: None });
+        let chooser = Chooser::new(field);
+        grid.field =
+            Some(OnGrid { field: field.clone(), normal, samples, chooser, exact: None, extra: Extra::default() });
+        self.waits = self.integral.form != Form::Auto;
+        self.key = None;
         self.stats.upload_ms = ms(start);
         Ok(())
     }
@@ -101,41 +152,80 @@ impl Renderer {
     pub(super) fn cast(&mut self, view: &View, progress: &Progress) -> Result<Image> {
         let start = Instant::now();
         let missing = |what: &str| Error::Render(format!("there is no {what} to draw"));
-        if !matches!(self.integral.form, Form::Auto | Form::Exact) {
-            let form = self.integral.form.name();
-            return Err(Error::Render(format!("grids have the exact integral, not {form}: --integral exact")));
-        }
         let reconstruction = self.reconstruction;
+        let steps = matches!(reconstruction.sampling, Sampling::Steps(_));
+        tabulated::check(self.integral.form, reconstruction.order, steps)?;
         let grid = self.grid.as_mut().ok_or_else(|| missing("grid"))?;
         let field = grid.field.as_mut().ok_or_else(|| missing("field"))?;
         let transfer = self.transfer.as_ref().ok_or_else(|| missing("transfer function"))?;
-        if !transfer.is_of_one_variable() {
-            let what = "the caster of grids draws neither a second variable nor light yet; the mesh of the grid's voxels has both";
+        let of_two = !transfer.is_of_one_variable();
+        if of_two && reconstruction.order != Order::Exact {
+            let what = "reconstructions are of one variable; with a second, or light, use --reconstruction exact";
             return Err(Error::Render(what.into()));
         }
-        let (kind, normal, scale) = (field.kind, field.normal, grid.volume.scale);
+        let (kind, normal, scale) = (field.kind(), field.normal, grid.volume.scale);
         reconstruction.check(grid.volume.diagonal())?;
         if field.exact.is_none() {
             field.exact = Some(Exact::new(transfer, kind, &normal, scale));
         }
+        let key = match &self.key {
+            Some(key) => key.clone(),
+            None if of_two => None,
+            None => {
+                let key = field.key(&self.integral, transfer, reconstruction, &grid.volume)?;
+                self.key.insert(key.map(Arc::new)).clone()
+            }
+        };
+        // The largest value along a ray is found without an integral.
+        let key = key.filter(|_| view.blend() == Blend::Composite);
+        let built = match &key {
+            Some(key) => self.tables.get(key, self.waits, &self.pool)?,
+            None => None,
+        };
+        if of_two {
+            let OnGrid { field, samples, extra, .. } = &mut *field;
+            super::second::check(field, transfer, view.blend())?;
+            self.pool.install(|| extra.prepare(&grid.volume, samples, field, transfer))?;
+        }
         let field = &*field;
         let exact = field.exact.as_ref().ok_or_else(|| missing("transfer function"))?;
-        let pixel = |v: &[f64]| field.largest(transfer, v);
+        let largest = field.largest(transfer, self.as_values);
+        let pixel = |v: &[f64]| largest.pixel(v);
+        let table = key.as_ref().zip(built.as_ref()).map(|(key, built)| {
+            let normal = [field.normal[0], field.chooser.normal()[0]];
+            Tabulated::new(&built.table, &key.exact, normal, reconstruction.order)
+        });
         let frame = cast::Frame {
             volume: &grid.volume,
             samples: &field.samples,
             exact,
             reconstruction,
+            table,
             view,
             pixel: &pixel,
             progress,
         };
-        let (pixels, steps) = self.pool.install(|| cast::render(&frame));
+        let (pixels, steps, panels) = if of_two {
+            let (pixels, [steps, panels]) = self.pool.install(|| field.extra.draw(&frame, &field.field, transfer))?;
+            (pixels, steps, panels)
+        } else {
+            let (pixels, steps) = self.pool.install(|| cast::render(&frame));
+            (pixels, steps, 0)
+        };
         let stats = &mut self.stats;
+        stats.panels = panels;
+        stats.device_bytes = grid.volume.bytes() + field.samples.bytes() + field.extra.bytes();
         (stats.steps, stats.repaired_rays, stats.cpu_rays) = (steps, 0, 0);
-        (stats.integral, stats.table_ms, stats.table_bytes) = (Form::Exact.name().into(), 0.0, 0);
+        let own = if of_two { "adaptive" } else { Form::Exact.name() };
+        stats.integral = built.as_ref().map_or(own, |b| b.table.choice().form.name()).into();
+        stats.table_ms = built.as_ref().map_or(0.0, |b| b.ms);
+        stats.table_bytes = built.as_ref().map_or(0, |b| b.table.bytes());
         (stats.device_ms, stats.projection, stats.sweep, stats.uploaded_bytes) = (None, None, None, 0);
         stats.frame_ms = ms(start);
+        self.waits = false;
+        if let Some(key) = key.filter(|_| built.is_none()) {
+            self.tables.start(&key, &self.pool)?;
+        }
         Ok(Image { size: view.size(), pixels })
     }
 }

@@ -119,16 +119,8 @@ impl Extra {
         transfer: &TransferFunction,
         blend: Blend,
     ) -> Result<(&TwoOrFive, &Second)> {
-        if blend == Blend::Maximum {
-            let what = "a maximum along rays knows neither a second variable nor light; a composite does";
-            return Err(Error::Render(what.into()));
-        }
-        if field.kind() != Kind::Scalar {
-            let what = "a second variable and light are for fields of one component";
-            return Err(Error::Field(what.into()));
-        }
+        check(field, transfer, blend)?;
         let lit = transfer.shading().is_some();
-        self.check_cells(field, transfer)?;
         let needs = lit || transfer.bivariate().is_some() && field.second().is_none();
         if needs && self.gradient.is_none() && field.association() == Association::Point {
             let count = mesh.points + mesh.tetrahedra.added.len();
@@ -169,24 +161,6 @@ impl Extra {
         Ok((&ready.values, function))
     }
 
-    /// Refuses what fields of cells have not.
-    fn check_cells(&self, field: &Field, transfer: &TransferFunction) -> Result<()> {
-        if field.association() == Association::Point {
-            return Ok(());
-        }
-        let widgets = |b: &Bivariate| matches!(b.source(), Source::Widgets(_)) && b.gradient_opacity().is_none();
-        let fits =
-            transfer.shading().is_none() && (field.second().is_some() || transfer.bivariate().is_none_or(widgets));
-        if fits {
-            return Ok(());
-        }
-        Err(Error::Field(
-            "values of cells have no gradient, as they are constant inside: light, and functions of the gradient's length, \
-             need an array of points"
-                .into(),
-        ))
-    }
-
     /// The values in the order of the mesh.
     fn gather(&self, mesh: &Loaded, field: &Field, normal: [Normal; 2], lit: bool) -> TwoOrFive {
         let (geometry, tetrahedra) = (&mesh.geometry, &mesh.tetrahedra);
@@ -221,6 +195,29 @@ impl Extra {
             [s, g, v.x as f32, v.y as f32, v.z as f32]
         }))
     }
+}
+
+/// Refuses what has no second variable and no light: a maximum, fields of several components, and what fields of cells have
+/// not.
+pub(super) fn check(field: &Field, transfer: &TransferFunction, blend: Blend) -> Result<()> {
+    if blend == Blend::Maximum {
+        let what = "a maximum along rays knows neither a second variable nor light; a composite does";
+        return Err(Error::Render(what.into()));
+    }
+    if field.kind() != Kind::Scalar {
+        let what = "a second variable and light are for fields of one component";
+        return Err(Error::Field(what.into()));
+    }
+    let widgets = |b: &Bivariate| matches!(b.source(), Source::Widgets(_)) && b.gradient_opacity().is_none();
+    let fits = transfer.shading().is_none() && (field.second().is_some() || transfer.bivariate().is_none_or(widgets));
+    if field.association() == Association::Point || fits {
+        return Ok(());
+    }
+    Err(Error::Field(
+        "values of cells have no gradient, as they are constant inside: light, and functions of the gradient's length, \
+         need an array of points"
+            .into(),
+    ))
 }
 
 /// Draws a frame on the current rayon pool.

@@ -4,6 +4,7 @@
 //! than it should be. Tables that the device builds are there as soon as they were asked for, as it does one thing
 //! after another; that is asked for after the frame that did not wait.
 
+use super::Renderer;
 use crate::error::{Error, Result};
 use crate::geometry::{Geometry, Values};
 use crate::integral::{Choice, Exact, Lookup};
@@ -142,6 +143,19 @@ impl Tables {
                 .map_err(|e| Error::Render(format!("cannot start threads for tables: {e}")))?,
         };
         Ok(self.pool.insert(pool))
+    }
+}
+
+impl Renderer {
+    /// Has the table built that a frame was drawn without.
+    pub(super) fn build_next(&mut self, late: Option<Arc<Key>>) -> Result<()> {
+        let Some(key) = late else { return Ok(()) };
+        self.tables.start(&key, &self.pool)?;
+        if let (true, Some(built), Some(exact)) = (key.on_device, self.tables.ready(&key), &self.exact) {
+            // What fails now fails again in the next frame, which says so.
+            let _ = self.backend.hold(exact, &built.table, false);
+        }
+        Ok(())
     }
 }
 

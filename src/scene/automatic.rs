@@ -130,6 +130,7 @@ pub fn scene(mesh: &Mesh, tetrahedra: &Tetrahedra, scalars: Scalars, field: &Fie
         pixel_offset: Default::default(),
         clipping_range: None,
         clipping_planes: Vec::new(),
+        cropping: None,
         opaque: Vec::new(),
         depth: None,
         blend: wishes.blend,
@@ -137,6 +138,7 @@ pub fn scene(mesh: &Mesh, tetrahedra: &Tetrahedra, scalars: Scalars, field: &Fie
         engine: None,
         device: None,
         integral: None,
+        reconstruction: None,
         projection: None,
     })
 }

@@ -1,6 +1,7 @@
 //! A scene as its file has it: what may be written, and what is wrong with what was.
 
 use super::reader::kind;
+use super::regions::{CroppingJson, SamplingJson, reconstruction};
 use super::second::{LightJson, Second, ShadeJson, TableJson, WidgetJson};
 use super::{DepthImage, Opaque, Scalars, Scene};
 use crate::engine::Engine;
@@ -47,6 +48,7 @@ pub(super) struct File {
     clipping_range: Option<[f64; 2]>,
     #[serde(default)]
     clipping_planes: Vec<PlaneJson>,
+    cropping: Option<CroppingJson>,
     #[serde(default)]
     opaque: Vec<Opaque>,
     depth: Option<DepthJson>,
@@ -56,6 +58,8 @@ pub(super) struct File {
     engine: Option<Engine>,
     device: Option<Value>,
     integral: Option<Value>,
+    reconstruction: Option<String>,
+    sampling: Option<SamplingJson>,
     projection: Option<Map<String, Value>>,
     #[serde(rename = "tol")]
     _tol: Option<IgnoredAny>,
@@ -231,6 +235,7 @@ impl File {
                 .into_iter()
                 .map(|p| ClippingPlane { origin: p.origin.into(), normal: p.normal.into() })
                 .collect(),
+            cropping: self.cropping.map(|c| c.cropping()).transpose().map_err(malformed)?,
             opaque: self.opaque,
             depth,
             blend: match self.blend {
@@ -241,6 +246,8 @@ impl File {
             engine: self.engine,
             device: self.device,
             integral: self.integral,
+            reconstruction: reconstruction(self.reconstruction.as_deref(), self.sampling.as_ref())
+                .map_err(malformed)?,
             projection: self.projection.map(Value::Object),
         };
         // Whatever is wrong with the view is the file's mistake, and is best said before the mesh is read.

@@ -5,7 +5,7 @@
 
 use super::Scalars;
 use crate::error::{Error, Result};
-use crate::field::{Association, Component, Field};
+use crate::field::{Association, Component, Field, Kind};
 use crate::mesh::cells::Tetrahedra;
 use crate::mesh::{Cells, Mesh};
 use crate::transfer::TransferFunction;
@@ -75,6 +75,27 @@ pub fn shown(
     let mesh = Mesh::new(points, cells, vec![], vec![])?;
     let tetrahedra = Tetrahedra::new(&mesh)?;
     Ok(Some(Shown { mesh: Some((mesh, tetrahedra)), field: field(&numbers)?, transfer }))
+}
+
+/// The same of a field on a grid: the value that is to stand for those that are missing ([`Field::with_missing`]), and the
+/// transfer function.
+///
+/// # Errors
+/// As [`shown`].
+pub fn shown_of_grid(
+    field: &Field,
+    transfer: &TransferFunction,
+    blend: Blend,
+    color: [f64; 3],
+    opacity: Option<f64>,
+) -> Result<Option<(f64, TransferFunction)>> {
+    if field.kind() != Kind::Scalar {
+        return Err(Error::Field("missing values have a colour where one value drives it".into()));
+    }
+    if (0..field.len()).all(|i| field.value(i).is_finite()) {
+        return Ok(None);
+    }
+    beyond(&field.range(0), transfer, blend, color, opacity).map(Some)
 }
 
 /// The values of `scalars`, as the array has them.

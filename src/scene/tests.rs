@@ -179,6 +179,8 @@ fn mistakes_are_named() {
     ] {
         let message = open(from, to).unwrap_err().to_string();
         assert!(parts.iter().all(|p| message.contains(p)), "{parts:?}: {message}");
+        // One of the keys has a strange word in it.
+        let message = message.replace("reconstruction", "");
         for strange in ["expected", "f64", "u32", "struct", "enum", "variant", "field", "invalid", "?:", "`", "JSON"] {
             assert!(!message.contains(strange), "{strange}: {message}");
         }

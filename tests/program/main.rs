@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot set up its files has failed")]
 
 mod look;
+mod orders;
 mod refusals;
 mod second;
 
@@ -426,7 +427,7 @@ fn tables_are_compared() {
     place.misused("tables cube.vtu --values 32 --error 0.1", "--error");
     // No form is left out where the numbers are odd.
     let Ran(_, out, _) = place.run("tables cube.vtu --values 7 --segments 1 --device cpu");
-    assert_eq!(out.lines().count(), 39, "{out}");
+    assert_eq!(out.lines().count(), 44, "{out}");
     let Ran(code, out, err) =
         place.run("tables cube.vtu --values 32 --segments 2000 --out sheet.png --tiles tiles.png --json tables.json");
     assert_eq!((code, err.as_str()), (Some(0), ""));
@@ -451,7 +452,9 @@ fn tables_are_compared() {
         "{tables}"
     );
     assert!(rms("second order, 1 length", "64 steps") < rms("second order, 1 length", "8 steps"), "{tables}");
-    assert!(rms("second order, degree 2", "f64") < 0.1, "{tables}");
+    assert!(rms("second order, 1 length", "256 steps, 8 bits") < rms("second order, 1 length", "8 steps"), "{tables}");
+    assert!(["f64", "closed"].iter().all(|how| rms("second order, degree 2", how) < 0.1), "{tables}");
+    assert!(rms("second order, lengths", "f64") < 0.1, "{tables}");
     assert!(rms("polynomial, degree 2", "closed, 16 bits") < rms("linear opacity", "closed"), "{tables}");
     assert!(rms("volume, uniform", "incremental") < 0.05 && rms("volume, log", "sliced") < 0.1, "{tables}");
     for picture in ["sheet.png", "tiles.png"] {

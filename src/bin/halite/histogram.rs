@@ -43,10 +43,15 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     let size = options.request.size.unwrap_or(BINS).map(|n| n as usize);
     let renderer = Renderer::with_device(threads, DeviceChoice::Cpu)?;
     let image = renderer.install(|| {
-        let job = render::prepare(&options.request, given)?.of_mesh("histogram")?;
-        let points = job.tetrahedra.points(job.mesh.points());
-        let histogram = Histogram::new(&points, &job.tetrahedra, &job.field, size)
-            .with_context(|| options.request.name().display().to_string())?;
+        let job = render::prepare(&options.request, given)?;
+        let histogram = match &job.grid {
+            Some(grid) => halite::cast::histogram(grid, &job.field, size),
+            None => {
+                let points = job.tetrahedra.points(job.mesh.points());
+                Histogram::new(&points, &job.tetrahedra, &job.field, size)
+            }
+        };
+        let histogram = histogram.with_context(|| options.request.name().display().to_string())?;
         let widgets = match job.scene.transfer.bivariate().map(Bivariate::source) {
             Some(Source::Widgets(widgets)) => &widgets[..],
             _ => &[],

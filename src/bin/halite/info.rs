@@ -1,10 +1,11 @@
+mod grid;
+
 use crate::{input, output, parse, progress};
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Args;
 use halite::field::{Association, Gradient};
 use halite::geometry::Geometry;
 use halite::geometry::contacts::Contacts;
-use halite::grid::Grid;
 use halite::io::DataSet;
 use halite::mesh::cells::{self, Listed, Tetrahedra};
 use halite::mesh::faces::Faces;
@@ -39,17 +40,13 @@ pub(crate) fn run(options: &Options) -> Result<()> {
         let step = options.time.map_or(Ok(0), |time| source.step(time))?;
         let read = progress::during("reading", |p| source.read_data_set(step, p))?;
         let name = if input::is_standard(path) { "standard input".to_owned() } else { path.display().to_string() };
-        let mesh = match read {
-            DataSet::Grid(grid) => {
-                describe_grid(&mut text, &name, &grid)?;
-                grid.into_mesh().with_context(|| name.clone())?
-            }
+        match read {
+            DataSet::Grid(grid) => grid::describe(&mut text, &name, &grid, (source.times(), step))?,
             DataSet::Mesh(mesh) => {
                 writeln!(text, "{name}: {} cells, {} points", mesh.cells().len(), mesh.points().len())?;
-                mesh
+                describe(&mut text, &mesh, (source.times(), step))?;
             }
-        };
-        describe(&mut text, &mesh, (source.times(), step))?;
+        }
     } else {
         list_devices(&mut text)?;
     }
@@ -107,23 +104,6 @@ fn list_arrays(out: &mut String, what: &str, arrays: &[Array], known: &Attribute
     }
     for LeftOut { name, why } in &known.left_out {
         writeln!(out, "  {name:wide$}  left out: {why}")?;
-    }
-    Ok(())
-}
-
-/// What a grid is by its axes.
-fn describe_grid(out: &mut String, name: &str, grid: &Grid) -> Result<()> {
-    let kind = if grid.is_regular() { "image data" } else { "rectilinear grid" };
-    let ([x, y, z], cells) = (grid.size(), grid.cell_count());
-    writeln!(out, "{name}: {kind}, {cells} cells, {x} x {y} x {z} points")?;
-    if let Some(spacing) = grid.spacing() {
-        writeln!(out, "  spacing  {} {} {}", short(spacing.x), short(spacing.y), short(spacing.z))?;
-    }
-    let direction = grid.direction();
-    if direction != glam::DMat3::IDENTITY {
-        let axes = [direction.x_axis, direction.y_axis, direction.z_axis];
-        let axes = axes.map(|d| format!("{} {} {}", short(d.x), short(d.y), short(d.z)));
-        writeln!(out, "  axes along  {}", axes.join("   "))?;
     }
     Ok(())
 }

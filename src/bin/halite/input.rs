@@ -42,17 +42,10 @@ pub(crate) fn source(path: &Path) -> Result<Source> {
 const MOST_SAMPLES: usize = 1 << 16;
 
 /// The mesh at `path`, at a time step, the first if nobody says; of a regular or rectilinear grid that itself, and a mesh
-/// of some of its cells, which colours and views are chosen by. Where the grid's own caster does not draw what is asked for
-/// (`as_mesh`), all of its cells as a mesh.
-pub(crate) fn mesh(path: &Path, time: Option<Time>, as_mesh: bool) -> Result<(Mesh, Option<Grid>)> {
+/// of some of its cells, which colours and views are chosen by.
+pub(crate) fn mesh(path: &Path, time: Option<Time>) -> Result<(Mesh, Option<Grid>)> {
     match data_set(path, time)? {
         DataSet::Mesh(mesh) => Ok((mesh, None)),
-        DataSet::Grid(grid) if as_mesh => {
-            tracing::warn!(
-                "the grid is drawn as the tetrahedra of its voxels: its caster knows no second variable and no light"
-            );
-            Ok((grid.into_mesh().with_context(|| path.display().to_string())?, None))
-        }
         DataSet::Grid(grid) => {
             let coarse = grid.coarse(MOST_SAMPLES).and_then(Grid::into_mesh);
             Ok((coarse.with_context(|| path.display().to_string())?, Some(grid)))

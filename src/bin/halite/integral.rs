@@ -13,7 +13,8 @@ use std::path::Path;
 /// What of the integral's form somebody said.
 #[derive(Args)]
 pub(crate) struct Integral {
-    /// How a ray is integrated in a cell: auto, exact, or by a table: volume, polynomial or cylindrical
+    /// How a ray is integrated in a cell: auto, exact, or by a table: volume, polynomial or cylindrical;
+    /// of a grid's slabs between samples, second-order (of one length) or second-order-polynomial
     #[arg(long, value_name = "FORM", value_parser = named::<Form>, help_heading = "Integral")]
     integral: Option<Form>,
     /// Texels of the table: values in front, values behind, and lengths (volume) or planes (cylindrical)
@@ -25,6 +26,9 @@ pub(crate) struct Integral {
     /// Degree of polynomials, 1 to 8 [default: 2]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=8), help_heading = "Integral")]
     degree: Option<u32>,
+    /// Steps in which slabs of second order are summed [default: 64]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65_536), help_heading = "Integral")]
+    iterations: Option<u32>,
     /// How the opacity of polynomials depends on the length: exponential, or linear
     #[arg(long, value_name = "KIND", value_parser = named::<Alpha>, help_heading = "Integral")]
     alpha: Option<Alpha>,
@@ -51,6 +55,7 @@ impl Integral {
             table: self.table.or(choice.table),
             lengths: self.lengths.unwrap_or(choice.lengths),
             degree: self.degree.unwrap_or(choice.degree),
+            iterations: self.iterations.unwrap_or(choice.iterations),
             alpha: self.alpha.unwrap_or(choice.alpha),
             planes: self.planes.unwrap_or(choice.planes),
             per_cell: self.plane_per_cell.unwrap_or(choice.per_cell),
@@ -65,6 +70,7 @@ impl Integral {
             ("--integral", self.integral.is_some()),
             ("--lengths", self.lengths.is_some()),
             ("--degree", self.degree.is_some()),
+            ("--iterations", self.iterations.is_some()),
             ("--alpha", self.alpha.is_some()),
             ("--planes", self.planes.is_some()),
             ("--plane-per-cell", self.plane_per_cell.is_some()),

@@ -156,6 +156,18 @@ pub(crate) fn plane(text: &str) -> Result<ClippingPlane, String> {
     if normal == DVec3::ZERO { Err("the normal is zero".into()) } else { Ok(ClippingPlane { origin, normal }) }
 }
 
+/// `X0,X1,Y0,Y1,Z0,Z1`
+pub(crate) fn crop(text: &str) -> Result<[[f64; 2]; 3], String> {
+    let [a, b, c, d, e, f] = numbers(text)?;
+    Ok([[a, b], [c, d], [e, f]])
+}
+
+/// Cropping regions by their name, with hyphens for blanks, or by their bits, such as 0x2000.
+pub(crate) fn regions(text: &str) -> Result<u32, String> {
+    let bits = text.strip_prefix("0x").map_or_else(|| text.parse(), |hex| u32::from_str_radix(hex, 16));
+    bits.or_else(|_| halite::scene::regions(&text.replace('-', " ")))
+}
+
 /// `S:A,S:A,…`
 pub(crate) fn opacity(text: &str) -> Result<Opacity, String> {
     let knot = |k: &str| {

@@ -5,7 +5,7 @@ use crate::steps::{self, Steps};
 use crate::{camera, input, integral, look, output, parse, progress, variant};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
-use glam::DVec3;
+use glam::{DMat4, DVec3};
 use halite::cast::{Order, Reconstruction, Sampling};
 use halite::field::{Association, Component, Field, Kind};
 use halite::gpu::DeviceChoice;
@@ -16,7 +16,7 @@ use halite::mesh::{Mesh, cells::Tetrahedra};
 use halite::project::Switches;
 use halite::render::{Engine, Renderer};
 use halite::scene::{Scalars, Scene, automatic, missing};
-use halite::view::{Blend, ClippingPlane};
+use halite::view::{Blend, ClippingPlane, Cropping, REGIONS};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -62,7 +62,7 @@ pub(crate) struct Request {
     #[arg(long, value_name = "ORDER", value_parser = parse::order)]
     reconstruction: Option<Order>,
     /// Where such samples are: at faces of voxels and midway, or so many world units apart [default: voxels]
-    #[arg(long, value_name = "voxels|LENGTH", value_parser = parse::sampling, requires = "reconstruction")]
+    #[arg(long, value_name = "voxels|LENGTH", value_parser = parse::sampling)]
     sampling: Option<Sampling>,
     /// Stretch the mesh, such as 1,1,50 to exaggerate heights; lengths are as they are seen then
     #[arg(long, value_name = "X,Y,Z", value_parser = parse::factors, allow_hyphen_values = true)]
@@ -115,6 +115,12 @@ pub(crate) struct Request {
     /// Keep what lies on the normal's side of a plane; may be given again
     #[arg(long, value_name = "X,Y,Z,NX,NY,NZ", value_parser = parse::plane, allow_hyphen_values = true, help_heading = "Look")]
     clip: Vec<ClippingPlane>,
+    /// Draw some of the 27 regions that two planes across each axis make: the one between all of them, unless others are named
+    #[arg(long, value_name = "X0,X1,Y0,Y1,Z0,Z1", value_parser = parse::crop, allow_hyphen_values = true, help_heading = "Look")]
+    crop: Option<[[f64; 2]; 3]>,
+    /// Which regions: subvolume, fence, inverted-fence, cross, inverted-cross, or bits, x + 3 y + 9 z that of region (x, y, z)
+    #[arg(long, value_name = "REGIONS", value_parser = parse::regions, requires = "crop", help_heading = "Look")]
+    crop_regions: Option<u32>,
 
     #[command(flatten)]
     second: Second,
@@ -210,8 +216,7 @@ pub(crate) fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut 
     let from_file = given.is_some();
     let start = Instant::now();
     let path = given.as_ref().map_or(options.input.clone(), |scene| scene.mesh.clone());
-    let of_two = given.as_ref().is_some_and(|scene| !scene.transfer.is_of_one_variable()) || options.second.is_given();
-    let (mut mesh, mut grid) = input::mesh(&path, steps.time, of_two)?;
+    let (mut mesh, mut grid) = input::mesh(&path, steps.time)?;
     if grid.is_none() && options.reconstruction.is_some() && !mesh.cells().is_empty() {
         bail!("{}: --reconstruction is for regular and rectilinear grids, and this is a mesh", path.display());
     }
@@ -227,6 +232,8 @@ pub(crate) fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut 
     tetrahedra.log();
 
     let solid = given.is_none() && options.has_no_choice(&mesh);
+    let of_scene = given.as_ref().and_then(|scene| scene.gradient_array.as_deref());
+    let second = options.second.gradient_array.clone().or(of_scene.map(str::to_owned));
     let (scalars, mut field) = if solid {
         tracing::info!("{}: it has no array of points or cells, and is drawn in one colour", path.display());
         let (field, color) = automatic::solid(&mesh)?;
@@ -238,16 +245,14 @@ pub(crate) fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut 
             None => options.scalars(given.as_ref(), &mesh)?,
         };
         steps.scalars = Some(scalars.clone());
-        let of_scene = given.as_ref().and_then(|scene| scene.gradient_array.as_deref());
-        let second = options.second.gradient_array.as_deref().or(of_scene);
-        let field = scalars.field_with(&mesh, second).with_context(|| path.display().to_string())?;
+        let field = scalars.field_with(&mesh, second.as_deref()).with_context(|| path.display().to_string())?;
         options.check(&field)?;
         (scalars, field)
     };
     // The field of all of a grid is drawn, and that of some of it looked at.
-    let whole = match &grid {
+    let whole = match &mut grid {
         Some(grid) if solid => Some(automatic::solid(grid)?.0),
-        Some(grid) => Some(scalars.field(grid).with_context(|| path.display().to_string())?),
+        Some(grid) => Some(scalars.taken_of(grid, second.as_deref()).with_context(|| path.display().to_string())?),
         None => None,
     };
     let mut scene = match given {
@@ -283,6 +288,10 @@ pub(crate) fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut 
     }
     scene.blend = options.blend().unwrap_or(scene.blend);
     scene.clipping_planes.extend(&options.clip);
+    if let Some(planes) = options.crop {
+        let regions = options.crop_regions.unwrap_or(REGIONS[0].1);
+        scene.cropping = Some(Cropping::new(planes, regions, DMat4::IDENTITY)?);
+    }
     scene.background = match options.background {
         Some(parse::Background::Color(c)) => Some(c),
         Some(parse::Background::None) => None,
@@ -291,18 +300,18 @@ pub(crate) fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut 
     };
     let legend = if solid { None } else { Legend::new(&scalars, &field, &scene.transfer, options.log) };
     if let Some(whole) = whole {
-        if options.nan_color.is_some() {
-            bail!(
-                "--nan-color: values that are missing in a regular or rectilinear grid have no colour of their own yet"
-            );
-        }
         field = whole;
     }
-    if let (Some((color, opacity)), false) = (options.nan_color, solid) {
-        let (transfer, blend) = (&scene.transfer, scene.blend);
-        if !transfer.is_of_one_variable() {
-            bail!("--nan-color: the scene has a second variable or light, of which missing values have none");
+    if options.nan_color.is_some() && !scene.transfer.is_of_one_variable() {
+        bail!("--nan-color: the scene has a second variable or light, of which missing values have none");
+    }
+    if let (Some(_), Some((color, opacity)), false) = (&grid, options.nan_color, solid) {
+        let shown = missing::shown_of_grid(&field, &scene.transfer, scene.blend, color, opacity)?;
+        if let Some((value, transfer)) = shown {
+            (field, scene.transfer) = (field.with_missing(value), transfer);
         }
+    } else if let (Some((color, opacity)), false) = (options.nan_color, solid) {
+        let (transfer, blend) = (&scene.transfer, scene.blend);
         let shown = missing::shown(&mesh, &tetrahedra, &scalars, transfer, blend, color, opacity)?;
         if let Some(shown) = shown {
             (field, scene.transfer) = (shown.field, shown.transfer);
@@ -367,8 +376,10 @@ impl Request {
             tracing::warn!("the projection engine alone has {others}, and it does not draw: --engine project");
         }
         let mut renderer = Renderer::with_engine(threads, device, engine)?;
-        let (order, sampling) = (self.reconstruction.unwrap_or_default(), self.sampling.unwrap_or_default());
-        if order == Order::Exact && sampling != Sampling::Voxels {
+        let of_scene = scene.and_then(|s| s.reconstruction).unwrap_or_default();
+        let order = self.reconstruction.unwrap_or(of_scene.order);
+        let sampling = self.sampling.unwrap_or(of_scene.sampling);
+        if order == Order::Exact && self.sampling.is_some_and(|s| s != Sampling::Voxels) {
             return Err(output::misuse(
                 "--sampling: the exact reconstruction takes no samples; --reconstruction 2 does",
             ));

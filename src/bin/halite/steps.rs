@@ -59,7 +59,7 @@ fn is_missing(error: &anyhow::Error, count: usize) -> bool {
 fn range_of_all(request: &Request, count: usize) -> Result<Option<[f64; 2]>> {
     let (mut all, mut scalars) = (None::<[f64; 2]>, None);
     for step in 0..count {
-        let (mesh, _) = match input::mesh(&request.input, Some(Time::Step(step)), false) {
+        let (mesh, _) = match input::mesh(&request.input, Some(Time::Step(step))) {
             Err(error) if is_missing(&error, count) => continue,
             read => read?,
         };

@@ -1,5 +1,6 @@
 mod forms;
 mod orders;
+mod reconstructions;
 
 use crate::render::{self, Job, Request};
 use crate::{output, parse, progress};
@@ -42,6 +43,13 @@ pub(crate) struct Options {
     /// Compare the orders of cells instead: where each is wrong, and what it takes
     #[arg(long, conflicts_with = "integrals")]
     orders_of_cells: bool,
+    /// Compare the orders of reconstruction of regular and rectilinear grids instead: figures and claims of El Hajjar et al. (2008).
+    /// The first volume is that of which tables are timed; names that begin with "synth" are of stand-ins
+    #[arg(long, conflicts_with_all = ["integrals", "orders_of_cells"])]
+    orders: bool,
+    /// Another volume to compare orders on; may be given again
+    #[arg(long = "volume", value_name = "FILE", requires = "orders")]
+    volumes: Vec<PathBuf>,
     /// Write errors and times as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -114,6 +122,9 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     output::check_picture(&options.out)?;
     if let Some(path) = &options.json {
         output::check(path)?;
+    }
+    if options.orders {
+        return reconstructions::run(options, threads);
     }
     if options.integrals {
         return forms::run(options, threads);

@@ -80,7 +80,7 @@ struct Form<'a> {
 /// A table that was built and judged.
 struct Row {
     name: &'static str,
-    construction: &'static str,
+    construction: String,
     size: String,
     bound: Option<f64>,
     bytes: u64,
@@ -184,7 +184,8 @@ fn row(form: Form<'_>, truth: &[([f64; 3], [f64; 4])]) -> Result<Option<Row>> {
         }
     }
     times.sort_by(f64::total_cmp);
-    let Form { name, construction, size, bound, .. } = form;
+    let Form { name, size, bound, .. } = form;
+    let construction = form.construction.into();
     let Built { bytes, look_up, .. } = last;
     let [rms, max] = errors(truth, &look_up);
     let build_ms = times[times.len() / 2];

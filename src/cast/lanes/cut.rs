@@ -6,10 +6,10 @@
 use super::Scene;
 use super::corners::STEPS;
 use super::lines::{FLAT, Line};
-use super::optics::{DEEPEST, Stretch};
 use super::walk::LANES;
 use crate::integral::Light;
 use crate::integral::cubic::Cubic;
+use crate::integral::cubic::stretch::{Stretch, part, shallow};
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, mask32x8};
 
@@ -24,9 +24,6 @@ const NEAR: f32 = 2e-7;
 
 /// Transmittance of a stretch below which the rest of it is not seen.
 const DARK: f32 = 1e-8;
-
-/// Steps in which a depth of any size becomes a small one.
-const TRIES: usize = 30;
 
 /// After a step of Newton's this short, what is left is about its square.
 const SHORT: f32 = 1e-3;
@@ -244,43 +241,6 @@ impl Cut {
 /// What f64 makes of a voxel whose values may not be finite, which then is not seen.
 fn of_any(scene: &Scene, value: &Cubic, length: f32) -> [f32; 4] {
     if value.0.iter().all(|v| v.is_finite()) { exactly(scene, value, length) } else { [0.0; 4] }
-}
-
-/// The growth over a part `h` long from `u` on of polynomials, and how far the value's mean there is above that at `u`.
-#[inline(always)]
-fn part<S: Simd>(simd: S, a: &[f32x8<S>; 4], u: f32x8<S>, h: f32x8<S>) -> ([f32x8<S>; 3], f32x8<S>) {
-    let bend = (u * a[3]).mul_add(f32x8::splat(simd, 3.0), a[2]);
-    let rise = [h * u.mul_add(a[2] + bend, a[1]), h * h * bend, h * h * h * a[3]];
-    (rise, rise[0] * (1.0 / 2.0) + rise[1] * (1.0 / 3.0) + rise[2] * (1.0 / 4.0))
-}
-
-/// How long the parts of pieces from `u` on, `h` long, are whose depths are up to [`DEEPEST`], and which of the lanes `on`
-/// end before `h`, as bits. The values are `offset` above the line's start there; extinction is a line with this value
-/// and slope.
-#[inline(always)]
-fn shallow<S: Simd>(
-    simd: S,
-    a: &[f32x8<S>; 4],
-    [u, h, offset]: [f32x8<S>; 3],
-    length: f32x8<S>,
-    [value, slope]: [f32x8<S>; 2],
-    on: mask32x8<S>,
-) -> (f32x8<S>, u64) {
-    let most = f32x8::splat(simd, DEEPEST);
-    let (mut h, mut cut) = (h, 0);
-    for _ in 0..TRIES {
-        let (_, mean) = part(simd, a, u, h);
-        let depth = slope.mul_add(offset + mean, value) * (length * h);
-        let deep = on & depth.simd_gt(most);
-        if deep.to_bitmask() == 0 {
-            break;
-        }
-        cut |= deep.to_bitmask();
-        // Right at once where extinction grows from 0; where it is even, in some such steps.
-        let share = (f32x8::splat(simd, 0.8 * DEEPEST) / depth).sqrt();
-        h = deep.select(h * share, h);
-    }
-    (h, cut)
 }
 
 /// Where in [u, 1], over which they go monotonely from s to `last`, polynomials have the values `knot`, where they do.

@@ -5,10 +5,10 @@ use super::Scene;
 use super::corners::STEPS;
 use super::cut::{Cut, SLOTS};
 use super::march::SLABS;
-use super::optics::{DEEPEST, Stretch};
 use super::passed::{Lanes, Passed, lanes, samples_of, stands_for};
 use super::walk::LANES;
 use crate::cast::reconstruction::Order;
+use crate::integral::cubic::stretch::{DEEPEST, Stretch};
 use fearless_simd::Simd;
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
@@ -85,6 +85,9 @@ impl Taken {
         let order = scene.frame.reconstruction.order;
         let parts = order.parts();
         let scale = f32x8::splat(simd, scene.frame.volume.scale as f32 / parts as f32);
+        if scene.frame.table.is_some() {
+            return self.look_up(simd, scene, passed);
+        }
         let slots = if scene.step.is_some() {
             let mut front = passed.value(simd, scene, 0);
             for s in 0..SLABS {
@@ -123,6 +126,45 @@ impl Taken {
             from = behind;
         }
         self.cut.flush(simd, scene);
+    }
+
+    /// Finds light and opacity of slabs in a table.
+    #[inline(always)]
+    fn look_up<S: Simd>(&mut self, simd: S, scene: &Scene, passed: &Passed) {
+        let steps = scene.step.is_some();
+        let mut front = passed.value(simd, scene, 0);
+        for s in 0..if steps { SLABS } else { passed.count.min(STEPS) } {
+            let (samples, length) = if steps {
+                let (middle, back) = (passed.value(simd, scene, 2 * s + 1), passed.value(simd, scene, 2 * s + 2));
+                let samples = [front, middle, back];
+                front = back;
+                (samples, passed.slabs[s])
+            } else {
+                (samples_of(simd, passed.cubic(simd, scene, s)), passed.length[s])
+            };
+            self.read(scene, s, samples.map(Into::into), length);
+        }
+    }
+
+    /// Reads what the slabs of step `s` do.
+    #[inline(never)]
+    fn read(&mut self, scene: &Scene, s: usize, samples: [Lanes; 3], length: Lanes) {
+        let Some(table) = &scene.frame.table else { return };
+        let parts = scene.frame.reconstruction.order.parts();
+        let scale = scene.frame.volume.scale / parts as f64;
+        let [times, plus] = scene.back;
+        for part in 0..parts {
+            let light = &mut self.cut.light[(s * parts + part) % SLOTS];
+            for l in 0..LANES {
+                let own = if length[l] > 0.0 {
+                    let samples = samples.map(|v| f64::from(v[l]) * times + plus);
+                    table.part(samples, part, f64::from(length[l]) * scale)
+                } else {
+                    [0.0; 4]
+                };
+                (0..4).for_each(|k| light[k][l] = own[k]);
+            }
+        }
     }
 
     #[inline(always)]

@@ -166,6 +166,7 @@ fn difference(grid: &Grid, field: &Field, transfer: &TransferFunction, view: &Vi
         samples: &samples,
         exact: &exact,
         reconstruction: how,
+        table: None,
         view,
         pixel: &|_| [0.0; 4],
         progress: &|_| ControlFlow::Continue(()),

@@ -8,8 +8,8 @@ use crate::cast::volume::{BLOCK, Samples, Volume};
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, f64x8, u32x8};
 
-/// Rays of a packet.
-pub(super) const LANES: usize = 8;
+/// Rays of a packet: one for each stretch that is integrated at once.
+pub(super) use crate::integral::cubic::stretch::LANES;
 
 /// A number for each ray.
 pub(super) type Row = [f64; LANES];

@@ -74,6 +74,8 @@ pub(crate) fn judged(table: &Lookup, [front, back, l]: [f32; 3]) -> [f64; 4] {
         Stored::Volume(t) => t.look_up(front, back, l),
         Stored::Polynomial(t) => t.look_up(front, back, l),
         Stored::Cylindrical(t) => t.look_up(front, back, l),
+        Stored::SecondOrder(t) => t.look_up([front, (front + back) / 2.0, back]),
+        Stored::SecondOrderPolynomial(t) => t.look_up([front, (front + back) / 2.0, back], l),
     }
 }
 

@@ -70,11 +70,11 @@ use cell::Cell;
 use std::f64::consts::{E, LN_2};
 
 /// Errors of rounding texels to f32 and of what builds them, relative to the greatest colour.
-const ROUNDING: f64 = 2e-6;
+pub(super) const ROUNDING: f64 = 2e-6;
 
 /// For degrees from 1: ½ ∫|B_{n+1}| max|Π (x − i/n)|/(n + 1)!, and the Lebesgue constant of n + 1 points at equal
 /// distances.
-const DEGREES: [[f64; 2]; 8] = [
+pub(super) const DEGREES: [[f64; 2]; 8] = [
     [4.010e-3, 1.0],
     [1.253e-4, 1.25],
     [5.033e-6, 1.6312],
@@ -118,7 +118,7 @@ fn is_bounded(exact: &Exact<f64>, values: u32) -> bool {
 }
 
 /// The greatest of the function's colours.
-fn brightest(exact: &Exact<f64>) -> f64 {
+pub(super) fn brightest(exact: &Exact<f64>) -> f64 {
     exact.opacity.value.iter().flat_map(|v| &v[1..]).fold(0.0, |m: f64, &c| m.max(c))
 }
 

@@ -2,12 +2,13 @@
 
 use super::Row;
 use halite::integral::Exact;
-use halite::integral::table::{SecondOrder, SecondOrderPolynomial, parabola};
+use halite::integral::table::{SecondOrder, SecondOrderLengths, SecondOrderPolynomial, parabola};
 use rayon::prelude::*;
 use std::time::Instant;
 
-/// The most texels along each axis: of tables of one length, and of those of all.
-const MOST: [u32; 2] = [128, 64];
+/// The most texels along each axis: of tables of one length, of those of all, and of that of four parameters, with its lengths.
+const MOST: [u32; 3] = [256, 64, 16];
+const LENGTHS: u32 = 16;
 
 /// Steps of the published construction.
 const ITERATIONS: [(&str, u32); 3] = [("8 steps", 8), ("64 steps", 64), ("256 steps", 256)];
@@ -19,29 +20,38 @@ type Slab = ([f64; 3], f64);
 
 /// The tables that were built, with so many `values` along each axis at most, and their errors over `count` slabs.
 pub(super) fn rows(exact: &Exact<f64>, longest: f64, values: u32, count: u32) -> Vec<Row> {
-    let [n, m] = MOST.map(|most| most.min(values));
+    let [n, m, few] = MOST.map(|most| most.min(values));
     let mut rows = vec![];
     let of_one = slabs(exact, count, |_| longest);
     for (construction, iterations) in ITERATIONS {
-        let start = Instant::now();
-        let Some(table) = SecondOrder::published(exact, n, longest, iterations) else { continue };
-        let build_ms = start.elapsed().as_secs_f64() * 1e3;
-        let mut add = |construction, table: &SecondOrder, bytes| {
-            let row = row("second order, 1 length", construction, &of_one, |(s, _)| table.look_up(s));
-            rows.push(Row { size: format!("{n}x{n}x{n}"), bytes, build_ms, ..row });
-        };
-        add(construction, &table, table.bytes());
-        if iterations == 64 {
-            add("64 steps, 8 bits", &table.rounded(8), table.bytes() / 4);
+        let ways = [SecondOrder::published, SecondOrder::published_in_bytes];
+        for (build, bits) in ways.into_iter().zip(["", ", 8 bits"]) {
+            let start = Instant::now();
+            let Some(table) = build(exact, n, longest, iterations) else { continue };
+            let build_ms = start.elapsed().as_secs_f64() * 1e3;
+            let row =
+                row("second order, 1 length", format!("{construction}{bits}"), &of_one, |(s, _)| table.look_up(s));
+            let bound = bits.is_empty().then(|| table.bound(exact));
+            rows.push(Row { size: format!("{n}x{n}x{n}"), bytes: table.bytes(), build_ms, bound, ..row });
         }
     }
     let of_all = slabs(exact, count, |share| longest * share);
-    for (name, degree) in DEGREES {
-        let start = Instant::now();
-        let Some(table) = SecondOrderPolynomial::new(exact, degree, m, longest) else { continue };
+    let start = Instant::now();
+    if let Some(table) = SecondOrderLengths::new(exact, few, LENGTHS, longest) {
         let build_ms = start.elapsed().as_secs_f64() * 1e3;
-        let row = row(name, "f64", &of_all, |(s, l)| table.look_up(s, l));
-        rows.push(Row { size: format!("{m}x{m}x{m}x{}", degree + 1), bytes: table.bytes(), build_ms, ..row });
+        let row = row("second order, lengths", "f64".into(), &of_all, |(s, l)| table.look_up(s, l));
+        rows.push(Row { size: format!("{few}x{few}x{few}x{LENGTHS}"), bytes: table.bytes(), build_ms, ..row });
+    }
+    for (name, degree) in DEGREES {
+        let ways = [SecondOrderPolynomial::new, SecondOrderPolynomial::closed];
+        for (build, construction) in ways.into_iter().zip(["f64", "closed"]) {
+            let start = Instant::now();
+            let Some(table) = build(exact, degree, m, longest) else { continue };
+            let build_ms = start.elapsed().as_secs_f64() * 1e3;
+            let row = row(name, construction.into(), &of_all, |(s, l)| table.look_up(s, l));
+            let (size, bound) = (format!("{m}x{m}x{m}x{}", degree + 1), table.bound(exact));
+            rows.push(Row { size, bytes: table.bytes(), build_ms, bound, ..row });
+        }
     }
     rows
 }
@@ -60,7 +70,7 @@ fn slabs(exact: &Exact<f64>, count: u32, length: impl Fn(f64) -> f64 + Sync) -> 
 /// A table, judged by what slabs do.
 fn row(
     name: &'static str,
-    construction: &'static str,
+    construction: String,
     slabs: &[(Slab, [f64; 4])],
     look_up: impl Fn(Slab) -> [f64; 4],
 ) -> Row {

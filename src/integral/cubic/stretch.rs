@@ -5,20 +5,27 @@
 //! Its integrand is 0 at the front and known at the back, so the Gauss–Lobatto rule of five points, exact where T is
 //! small, takes three. Direct emission has ∫ e^{−T} and ∫ σ e^{−T} by the same rule.
 
-use super::walk::LANES;
+#![allow(clippy::needless_range_loop, reason = "channels and lanes of several arrays are counted at once")]
+
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x8, u32x8};
+use fearless_simd::{Simd, f32x8, mask32x8, u32x8};
+
+/// Stretches side by side.
+pub(crate) const LANES: usize = 8;
 
 /// Optical depth up to which the series of e^{−T} holds.
 const THIN: f32 = 0.25;
 
 /// Optical depth up to which five points do.
-pub(super) const DEEPEST: f32 = 1.0;
+pub(crate) const DEEPEST: f32 = 1.0;
 
 /// Optical depth up to which Simpson's rule does, the Gauss–Lobatto rule of three points, if the value bends little: what
 /// its bend times the change of depth is off by is below this times 0.015.
 const FAINT: f32 = 0.1;
 const STRAIGHT: f32 = 1e-6;
+
+/// Steps in which a depth of any size becomes a small one.
+const TRIES: usize = 30;
 
 /// Inner nodes in [0, 1], and weights, of the Gauss–Lobatto rule of five points, and the ends' weight.
 const NODES: [f32; 3] = [0.172_673_16, 0.5, 0.827_326_84];
@@ -35,26 +42,26 @@ const SERIES: [f32; 6] = [1.0, -1.0 / 2.0, 1.0 / 6.0, -1.0 / 24.0, 1.0 / 120.0, 
 const SHORT: [f32; 4] = [1.0, -1.0 / 2.0, 1.0 / 6.0, -1.0 / 24.0];
 
 /// A stretch: its value is σ₀ + a₁ u + a₂ u² + a₃ u³ above the line's start.
-pub(super) struct Stretch<S: Simd> {
-    pub(super) offset: f32x8<S>,
-    pub(super) rise: [f32x8<S>; 3],
-    pub(super) length: f32x8<S>,
+pub(crate) struct Stretch<S: Simd> {
+    pub(crate) offset: f32x8<S>,
+    pub(crate) rise: [f32x8<S>; 3],
+    pub(crate) length: f32x8<S>,
     /// Extinction and colour at the line's start, and their slopes.
-    pub(super) value: [f32x8<S>; 4],
-    pub(super) slope: [f32x8<S>; 4],
+    pub(crate) value: [f32x8<S>; 4],
+    pub(crate) slope: [f32x8<S>; 4],
 }
 
 /// What it does: optical depth, opacity, light.
-pub(super) struct Light<S: Simd> {
-    pub(super) depth: f32x8<S>,
-    pub(super) alpha: f32x8<S>,
-    pub(super) color: [f32x8<S>; 3],
+pub(crate) struct Light<S: Simd> {
+    pub(crate) depth: f32x8<S>,
+    pub(crate) alpha: f32x8<S>,
+    pub(crate) color: [f32x8<S>; 3],
 }
 
 impl<S: Simd> Stretch<S> {
     /// Its integral, where its depth is up to [`DEEPEST`].
     #[inline(always)]
-    pub(super) fn integrate(&self, simd: S, direct: bool) -> Light<S> {
+    pub(crate) fn integrate(&self, simd: S, direct: bool) -> Light<S> {
         let of = f32x8::splat;
         let [a, b, c] = self.rise;
         let scaled = self.length * self.slope[0];
@@ -170,4 +177,41 @@ fn exp_of_minus<S: Simd>(simd: S, x: f32x8<S>) -> f32x8<S> {
     let biased = bits - u32x8::splat(simd, ROUND.to_bits() - 127);
     let scale: f32x8<S> = (biased << 23).bitcast();
     p * scale
+}
+
+/// The growth over a part `h` long from `u` on of polynomials, and how far the value's mean there is above that at `u`.
+#[inline(always)]
+pub(crate) fn part<S: Simd>(simd: S, a: &[f32x8<S>; 4], u: f32x8<S>, h: f32x8<S>) -> ([f32x8<S>; 3], f32x8<S>) {
+    let bend = (u * a[3]).mul_add(f32x8::splat(simd, 3.0), a[2]);
+    let rise = [h * u.mul_add(a[2] + bend, a[1]), h * h * bend, h * h * h * a[3]];
+    (rise, rise[0] * (1.0 / 2.0) + rise[1] * (1.0 / 3.0) + rise[2] * (1.0 / 4.0))
+}
+
+/// How long the parts of pieces from `u` on, `h` long, are whose depths are up to [`DEEPEST`], and which of the lanes `on`
+/// end before `h`, as bits. The values are `offset` above the line's start there; extinction is a line with this value
+/// and slope.
+#[inline(always)]
+pub(crate) fn shallow<S: Simd>(
+    simd: S,
+    a: &[f32x8<S>; 4],
+    [u, h, offset]: [f32x8<S>; 3],
+    length: f32x8<S>,
+    [value, slope]: [f32x8<S>; 2],
+    on: mask32x8<S>,
+) -> (f32x8<S>, u64) {
+    let most = f32x8::splat(simd, DEEPEST);
+    let (mut h, mut cut) = (h, 0);
+    for _ in 0..TRIES {
+        let (_, mean) = part(simd, a, u, h);
+        let depth = slope.mul_add(offset + mean, value) * (length * h);
+        let deep = on & depth.simd_gt(most);
+        if deep.to_bitmask() == 0 {
+            break;
+        }
+        cut |= deep.to_bitmask();
+        // Right at once where extinction grows from 0; where it is even, in some such steps.
+        let share = (f32x8::splat(simd, 0.8 * DEEPEST) / depth).sqrt();
+        h = deep.select(h * share, h);
+    }
+    (h, cut)
 }
