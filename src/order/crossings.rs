@@ -33,6 +33,12 @@ pub(crate) struct Crossings {
     sorted: Vec<Crossing>,
     /// Pixel i has `sorted[start[i]..start[i + 1]]`.
     start: Vec<u32>,
+    /// Where the ray of each pixel enters the mesh first: −∞ if the eye is inside, or it never does.
+    first: Vec<f32>,
+    /// Where it crosses the boundary last: −∞ if it never does.
+    last: Vec<f32>,
+    /// How much more often it enters than it leaves.
+    balance: Vec<i32>,
 }
 
 impl Crossings {
@@ -119,12 +125,25 @@ impl Crossings {
             self.sorted[*at as usize] = *c;
             *at += 1;
         }
-        for w in self.start.windows(2) {
+        for places in [&mut self.first, &mut self.last] {
+            places.clear();
+            places.resize(PIXELS, f32::NEG_INFINITY);
+        }
+        self.balance.clear();
+        self.balance.resize(PIXELS, 0);
+        for (pixel, w) in self.start.windows(2).enumerate() {
             let of_pixel = &mut self.sorted[w[0] as usize..w[1] as usize];
             if of_pixel.len() > 1 {
                 let place = |c: &Crossing| if c.enters { c.key } else { c.key - TOGETHER };
                 of_pixel.sort_unstable_by(|a, b| place(a).total_cmp(&place(b)).then(a.cell.cmp(&b.cell)));
             }
+            if let Some(first) = of_pixel.first().filter(|c| c.enters) {
+                self.first[pixel] = first.key as f32;
+            }
+            if let Some(last) = of_pixel.last() {
+                self.last[pixel] = last.key as f32;
+            }
+            self.balance[pixel] = of_pixel.iter().map(|c| if c.enters { 1 } else { -1 }).sum();
         }
     }
 
@@ -132,14 +151,14 @@ impl Crossings {
         &self.sorted[self.start[pixel] as usize..self.start[pixel + 1] as usize]
     }
 
-    /// Where a pixel's ray enters the mesh first; −∞ if the eye is inside, or it never does.
-    pub(crate) fn first(&self, pixel: usize) -> f32 {
-        self.of(pixel).first().filter(|c| c.enters).map_or(f32::NEG_INFINITY, |c| c.key as f32)
+    /// Where each pixel's ray enters the mesh first; −∞ if the eye is inside, or it never does.
+    pub(crate) fn first(&self) -> &[f32] {
+        &self.first
     }
 
-    /// Where a pixel's ray crosses the boundary last.
-    pub(crate) fn last(&self, pixel: usize) -> f32 {
-        self.of(pixel).last().map_or(f32::NEG_INFINITY, |c| c.key as f32)
+    /// Where each pixel's ray crosses the boundary last; −∞ if it never does.
+    pub(crate) fn last(&self) -> &[f32] {
+        &self.last
     }
 
     /// Whether a pixel's ray crosses the boundary anywhere.
@@ -150,7 +169,7 @@ impl Crossings {
     /// How much of the mesh, in keys, a pixel's ray has between two keys; none if it enters not as often as it leaves.
     pub(crate) fn between(&self, pixel: usize, from: f64, to: f64, eye_inside: bool) -> Option<f64> {
         let all = self.of(pixel);
-        let sum: i32 = all.iter().map(|c| if c.enters { 1 } else { -1 }).sum();
+        let sum = self.balance[pixel];
         if sum > 0 || (sum < 0 && !eye_inside) {
             return None;
         }
@@ -171,10 +190,11 @@ impl Crossings {
     /// Whether a pixel's ray is inside the mesh at this key, or crosses the boundary as near to it as `slack`.
     pub(crate) fn holds(&self, pixel: usize, key: f64, slack: f64) -> bool {
         let all = self.of(pixel);
-        let step = |c: &Crossing| if c.enters { 1 } else { -1 };
-        let before: i32 = all.iter().filter(|c| c.key < key).map(step).sum();
-        let sum: i32 = all.iter().map(step).sum();
-        before > sum.min(0) || all.iter().any(|c| (c.key - key).abs() <= slack)
+        if all.iter().any(|c| (c.key - key).abs() <= slack) {
+            return true;
+        }
+        let before: i32 = all.iter().filter(|c| c.key < key).map(|c| if c.enters { 1 } else { -1 }).sum();
+        before > self.balance[pixel].min(0)
     }
 
     /// Calls `pair` with each two cells through which the ray of a pixel leaves the mesh and then enters it again. Leaving for the
@@ -200,7 +220,7 @@ impl Crossings {
     /// its cells have an order.
     pub(crate) fn alternate(&self, pixel: usize) -> bool {
         let all = self.of(pixel);
-        let mut inside = -all.iter().map(|c| if c.enters { 1 } else { -1 }).sum::<i32>();
+        let mut inside = -self.balance[pixel];
         let mut is_one = (0..=1).contains(&inside);
         for c in all {
             inside += if c.enters { 1 } else { -1 };
@@ -233,15 +253,15 @@ impl Crossings {
     }
 }
 
-/// Where pixel (`i`, `j`) of a tile is in its arrays: blocks of 4 × 2 pixels lie together.
+/// Where pixel (`i`, `j`) of a tile is in its arrays: blocks of 4 × 4 pixels lie together.
 pub(crate) fn place(i: u32, j: u32) -> usize {
-    ((j / 2 * (TILE / 4) + i / 4) * 8 + j % 2 * 4 + i % 4) as usize
+    ((j / 4 * (TILE / 4) + i / 4) * 16 + j % 4 * 4 + i % 4) as usize
 }
 
 /// The column and row of a place in the arrays of a tile: the inverse of [`place`].
 pub(crate) fn pixel_at(place: usize) -> [u32; 2] {
-    let (block, within) = (place as u32 / 8, place as u32 % 8);
-    [block % (TILE / 4) * 4 + within % 4, block / (TILE / 4) * 2 + within / 4]
+    let (block, within) = (place as u32 / 16, place as u32 % 16);
+    [block % (TILE / 4) * 4 + within % 4, block / (TILE / 4) * 4 + within / 4]
 }
 
 #[cfg(test)]

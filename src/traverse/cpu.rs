@@ -6,7 +6,7 @@ mod segments;
 
 use crate::cell::{Face, Frame};
 use crate::geometry::boundary::{Beam, Candidate};
-use crate::geometry::{Cell, Geometry, Values};
+use crate::geometry::{Geometry, Values};
 use crate::image::Image;
 use crate::integral::second::Second;
 use crate::integral::{Integral, Light};
@@ -427,9 +427,9 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
     }
 }
 
-/// Has the memory of the cells that may come next brought near while the walk decides which.
+/// Has the memory of the cells that may come next brought near while it is decided which.
 #[inline(always)]
-fn prefetch(cells: &[Cell], next: [u32; 4]) {
+pub(crate) fn prefetch<T>(cells: &[T], next: [u32; 4]) {
     #[cfg(target_arch = "x86_64")]
     for cell in next.iter().filter_map(|&n| cells.get(n as usize)) {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};

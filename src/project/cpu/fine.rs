@@ -1,9 +1,10 @@
-//! Fine: the pixels of a cell, eight (4 × 2) at a time: found, checked, and kept together to be [measured](super::measure).
+//! Fine: the pixels of a cell, 4 × 4 at a time: found, checked, and kept together to be [measured](super::measure).
 //!
 //! A pixel keeps the key where its last cell ended. The next one must begin there, or a gap must lie between the two where the ray
 //! is outside the mesh, by its crossings of the boundary; at the end nothing of the mesh may be left. A pixel of which that is not
 //! true is flagged, and drawn again by other means. So the picture does not rest on the order of the cells.
 
+use super::lanes::{Floats, Ints, LANES, NUMBERS};
 use super::measure::Fragments;
 use super::setup::{Look, Record, Scene};
 use crate::integral::{Batch, Integral, Light};
@@ -11,14 +12,14 @@ use crate::order::crossings::{Crossings, place};
 use crate::order::screen::{ASIDE, NEAREST, TILE};
 use crate::traverse::cpu::least_light;
 use crate::view::{Blend, View};
+use fearless_simd::Simd;
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x8, i32x8};
 
 pub(super) const PIXELS: usize = (TILE * TILE) as usize;
 /// Blocks of a tile, in a row and in all.
 const ACROSS: usize = TILE as usize / 4;
-const ROWS: usize = TILE as usize / 2;
-const BLOCKS: usize = PIXELS / 8;
+const ROWS: usize = TILE as usize / 4;
+const BLOCKS: usize = PIXELS / LANES;
 
 /// How far from the end of the last cell the next may begin, in keys, of 1 and of the key; and how much of the mesh may be missed
 /// in a gap.
@@ -28,8 +29,8 @@ const SLACK: f32 = 2e-6;
 const GLANCE: u64 = 4096;
 
 /// Columns and rows of the pixels of a block.
-const ACROSS_BLOCK: [f32; 8] = [0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0];
-const DOWN_BLOCK: [f32; 8] = [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0];
+const ACROSS_BLOCK: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0];
+const DOWN_BLOCK: [f32; LANES] = [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 3.0];
 
 /// Why a pixel is drawn again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,8 +53,8 @@ pub(super) struct Canvas<const N: usize> {
     /// Red, green, blue, transmittance.
     pub(super) light: Box<[[f32; 4]; PIXELS]>,
     pub(super) largest: Vec<[f32; N]>,
-    last: Box<[[f32; 8]; BLOCKS]>,
-    limits: Box<[[[f32; 8]; BLOCKS]; 2]>,
+    last: Box<[[f32; LANES]; BLOCKS]>,
+    limits: Box<[[[f32; LANES]; BLOCKS]; 2]>,
     flaws: Box<[Flaw; PIXELS]>,
     /// A bit for each block of a row through which light still comes.
     alive: [u8; ROWS],
@@ -75,8 +76,8 @@ impl<const N: usize> Canvas<N> {
         Canvas {
             light: Box::new([[0.0; 4]; PIXELS]),
             largest: vec![[0.0; N]; PIXELS],
-            last: Box::new([[0.0; 8]; BLOCKS]),
-            limits: Box::new([[[0.0; 8]; BLOCKS]; 2]),
+            last: Box::new([[0.0; LANES]; BLOCKS]),
+            limits: Box::new([[[0.0; LANES]; BLOCKS]; 2]),
             flaws: Box::new([Flaw::None; PIXELS]),
             alive: [0; ROWS],
             glance: 0,
@@ -103,7 +104,7 @@ impl<const N: usize> Canvas<N> {
         self.nearest = if lens.meet { lens.key(4.0 * NEAREST) } else { f64::NEG_INFINITY };
         let [column, row] = corner.map(f64::from);
         self.stretch = lens.stretch(column + ASIDE.x, row + ASIDE.y).map(|v| v as f32);
-        self.last.as_flattened_mut().iter_mut().enumerate().for_each(|(at, last)| *last = crossings.first(at));
+        self.last.as_flattened_mut().copy_from_slice(crossings.first());
         if !lens.limited {
             return;
         }
@@ -111,8 +112,8 @@ impl<const N: usize> Canvas<N> {
             for i in 0..TILE.min(lens.size[0] - corner[0]) {
                 let at = place(i, j);
                 let [low, high] = lens.limits(scene.geometry, view, corner[0] + i, corner[1] + j);
-                self.limits[0][at / 8][at % 8] = low as f32;
-                self.limits[1][at / 8][at % 8] = high as f32;
+                self.limits[0][at / LANES][at % LANES] = low as f32;
+                self.limits[1][at / LANES][at % LANES] = high as f32;
             }
         }
     }
@@ -124,7 +125,7 @@ impl<const N: usize> Canvas<N> {
 
     /// Whether light still comes through the block that holds this pixel.
     fn lives(&self, at: usize) -> bool {
-        self.alive[at / 8 / ACROSS] >> (at / 8 % ACROSS) & 1 == 1
+        self.alive[at / LANES / ACROSS] >> (at / LANES % ACROSS) & 1 == 1
     }
 
     /// Draws a cell.
@@ -154,7 +155,8 @@ impl<const N: usize> Canvas<N> {
             _ => {}
         }
         if r.look == Look::Seen && scene.lens.limited {
-            self.found.limit(|at| [self.limits[0][at / 8][at % 8], self.limits[1][at / 8][at % 8]], r.key);
+            self.found
+                .limit(|at| [self.limits[0][at / LANES][at % LANES], self.limits[1][at / LANES][at % LANES]], r.key);
         }
         if r.look == Look::Unseen || self.found.count == 0 {
             return;
@@ -177,8 +179,8 @@ impl<const N: usize> Canvas<N> {
         simd.vectorize(
             #[inline(always)]
             || {
-                let of = |v: f32| f32x8::splat(simd, v);
-                let load = |v: &[f32; 8]| f32x8::load_array_ref(simd, v);
+                let of = |v: f32| Floats::splat(simd, v);
+                let load = |v: &[f32; LANES]| Floats::load_array_ref(simd, v);
                 // Written out: `map` of an array of vectors goes by way of memory.
                 let four = |v: [f32; 4]| [of(v[0]), of(v[1]), of(v[2]), of(v[3])];
                 let (start, slope, down) = (four(r.plane[0]), four(r.plane[1]), four(r.plane[2]));
@@ -187,13 +189,13 @@ impl<const N: usize> Canvas<N> {
                 // The eye inside: from very near to it. What lies behind it is beyond what is infinitely far.
                 let eye = of(if r.kappa > 0.0 { -1e7 / (r.kappa * r.kappa) } else { f32::NEG_INFINITY });
                 let beyond = of(1.0 / r.kappa);
-                let numbers = i32x8::load_array(simd, [0, 1, 2, 3, 4, 5, 6, 7]);
+                let numbers = Ints::load_array(simd, NUMBERS);
                 let [x0, x1, y0, y1] = r.pixels.map(usize::from);
                 let first_x = (load(&ACROSS_BLOCK) + ((x0 / 4 * 4) as f32 - r.at[0])) - r.rest[0];
                 let mut at = 0;
-                for by in y0 / 2..(y1 / 2 + 1).min(ROWS) {
+                for by in y0 / 4..(y1 / 4 + 1).min(ROWS) {
                     // Whole pixels first, which are exact.
-                    let y = (load(&DOWN_BLOCK) + ((2 * by) as f32 - r.at[1])) - r.rest[1];
+                    let y = (load(&DOWN_BLOCK) + ((4 * by) as f32 - r.at[1])) - r.rest[1];
                     let row = |f: usize| y.mul_add(down[f], start[f]);
                     let row = [row(0), row(1), row(2), row(3)];
                     let blocks = self.alive[by];
@@ -225,7 +227,7 @@ impl<const N: usize> Canvas<N> {
                         // Not a selection from what was there: that would become a masked store, which some processors do slowly.
                         let end = inside.select(key_out, of(f32::NEG_INFINITY));
                         last.max(end).store_array(&mut self.last[block]);
-                        at += self.found.add(at, inside, enter, leave, numbers + (8 * block) as i32);
+                        at += self.found.add(simd, at, inside, enter, leave, numbers + (LANES * block) as i32);
                     }
                 }
                 self.found.count = at;
@@ -251,8 +253,8 @@ impl<const N: usize> Canvas<N> {
         if blend == Blend::Maximum {
             return;
         }
-        for (row, alive) in self.light.chunks(8 * ACROSS).zip(&mut self.alive) {
-            for (k, block) in row.chunks(8).enumerate() {
+        for (row, alive) in self.light.chunks(LANES * ACROSS).zip(&mut self.alive) {
+            for (k, block) in row.chunks(LANES).enumerate() {
                 let most = block.iter().fold(0.0, |most: f32, light| most.max(light[3]));
                 *alive &= !(u8::from(most < least) << k);
             }
@@ -310,15 +312,15 @@ impl<const N: usize> Canvas<N> {
                 let Some([mut enter, mut leave]) = cell.depths(column, row) else { continue };
                 let key = |w: f64| lens.key(w) as f32;
                 let (key_in, key_out) = (key(enter), key(leave));
-                let last = &mut self.last[at / 8][at % 8];
+                let last = &mut self.last[at / LANES][at % LANES];
                 let from = std::mem::replace(last, last.max(key_out));
                 let apart = (key_in - from).abs();
                 if apart.is_nan() || apart > SLACK * (1.0 + key_in.abs()) {
                     self.check_gap(crossings, at, from, key_in);
                 }
                 if lens.limited {
-                    enter = enter.max(lens.depth(f64::from(self.limits[0][at / 8][at % 8])));
-                    leave = leave.min(lens.depth(f64::from(self.limits[1][at / 8][at % 8])));
+                    enter = enter.max(lens.depth(f64::from(self.limits[0][at / LANES][at % LANES])));
+                    leave = leave.min(lens.depth(f64::from(self.limits[1][at / LANES][at % LANES])));
                 }
                 if enter >= leave {
                     continue;
@@ -348,8 +350,10 @@ impl<const N: usize> Canvas<N> {
     /// [`Self::check_gap`] for some pixels of a block.
     #[cold]
     #[inline(never)]
-    fn check_gaps(&mut self, crossings: &Crossings, block: usize, lanes: u64, from: [f32; 8], to: [f32; 8]) {
-        (0..8).filter(|l| lanes >> l & 1 == 1).for_each(|l| self.check_gap(crossings, 8 * block + l, from[l], to[l]));
+    fn check_gaps(&mut self, crossings: &Crossings, block: usize, lanes: u64, from: [f32; LANES], to: [f32; LANES]) {
+        (0..LANES)
+            .filter(|l| lanes >> l & 1 == 1)
+            .for_each(|l| self.check_gap(crossings, LANES * block + l, from[l], to[l]));
     }
 
     /// Flags a pixel unless the mesh is absent between two keys.
@@ -379,41 +383,78 @@ impl<const N: usize> Canvas<N> {
         };
     }
 
-    /// Checks what is left of the mesh behind the last cells; then calls `pixel` with each pixel of the tile within `size`: where it
-    /// is in it, what it is, and why it must be drawn again.
+    /// Checks what is left of the mesh behind the last cells, and writes the tile's pixels to `rows`. Returns how many rays meet
+    /// the mesh. Pixels that must be drawn again go to `flawed`, with their column and row.
     pub(super) fn finish(
         &mut self,
         scene: &Scene<N>,
         integral: &Integral,
         crossings: &Crossings,
-        size: [u32; 2],
+        rows: &mut [&mut [[f32; 4]]],
         color: &dyn Fn(&[f32; N]) -> [f32; 4],
-        mut pixel: impl FnMut(u32, u32, [f32; 4], Flaw),
-    ) {
-        let least = least_light(integral.exact.direct);
-        for j in 0..size[1] {
-            for i in 0..size[0] {
-                let at = place(i, j);
-                let ended = scene.blend == Blend::Composite && self.light[at][3] < least;
-                let (last, end) = (self.last[at / 8][at % 8], crossings.last(at));
-                if !ended && end > last + SLACK * (1.0 + end.abs()) {
-                    self.check_gap(crossings, at, last, end);
-                }
-                // Not compared with an end at −∞: that is where no ray meets the mesh.
-                let beyond = last > if crossings.any(at) { end + SLACK * (1.0 + end.abs()) } else { end };
-                if beyond && self.flaws[at] == Flaw::None {
-                    self.flaws[at] = Flaw::Boundary;
-                }
-                let light = match scene.blend {
-                    Blend::Composite => {
-                        let [r, g, b, t] = self.light[at];
-                        [r, g, b, 1.0 - t]
+        mut flawed: impl FnMut(u32, u32, Flaw),
+    ) -> u64 {
+        let least = match scene.blend {
+            Blend::Composite => least_light(integral.exact.direct),
+            Blend::Maximum => f32::NEG_INFINITY,
+        };
+        let mut covered = 0;
+        for block in 0..BLOCKS {
+            let (column, row) = (block % ACROSS * 4, block / ACROSS * 4);
+            let doubtful = self.is_doubtful(block, crossings, least);
+            for (j, row) in rows.iter_mut().enumerate().skip(row).take(4) {
+                for (i, pixel) in row.iter_mut().enumerate().skip(column).take(4) {
+                    let at = place(i as u32, j as u32);
+                    covered += u64::from(crossings.last()[at] > f32::NEG_INFINITY);
+                    if doubtful {
+                        self.check_end(crossings, at, least);
+                        if self.flaws[at] != Flaw::None {
+                            flawed(i as u32, j as u32, self.flaws[at]);
+                        }
                     }
-                    Blend::Maximum if self.largest[at][N - 1] == f32::NEG_INFINITY => [0.0; 4],
-                    Blend::Maximum => color(&self.largest[at]),
-                };
-                pixel(i, j, light, self.flaws[at]);
+                    *pixel = match scene.blend {
+                        Blend::Composite => {
+                            let [r, g, b, t] = self.light[at];
+                            [r, g, b, 1.0 - t]
+                        }
+                        Blend::Maximum if self.largest[at][N - 1] == f32::NEG_INFINITY => [0.0; 4],
+                        Blend::Maximum => color(&self.largest[at]),
+                    };
+                }
             }
         }
+        covered
     }
+
+    /// Whether a pixel of a block is flawed, or may be at its end.
+    fn is_doubtful(&self, block: usize, crossings: &Crossings, least: f32) -> bool {
+        let range = LANES * block..LANES * (block + 1);
+        let (ends, light, flaws) = (&crossings.last()[range.clone()], &self.light[range.clone()], &self.flaws[range]);
+        let mut doubtful = false;
+        for l in 0..LANES {
+            let [missed, beyond] = end(self.last[block][l], ends[l]);
+            doubtful |= missed & (light[l][3] >= least) | beyond | (flaws[l] != Flaw::None);
+        }
+        doubtful
+    }
+
+    /// Checks what is left of the mesh behind the last cell of a pixel.
+    fn check_end(&mut self, crossings: &Crossings, at: usize, least: f32) {
+        let (last, place) = (self.last[at / LANES][at % LANES], crossings.last()[at]);
+        let [missed, beyond] = end(last, place);
+        if missed && self.light[at][3] >= least {
+            self.check_gap(crossings, at, last, place);
+        }
+        if beyond && self.flaws[at] == Flaw::None {
+            self.flaws[at] = Flaw::Boundary;
+        }
+    }
+}
+
+/// Whether the mesh goes on behind the end of the last cell, or that lies behind the end of the mesh.
+#[inline(always)]
+fn end(last: f32, mesh: f32) -> [bool; 2] {
+    // Not compared with an end at −∞: that is where no ray meets the mesh.
+    let slack = if mesh > f32::NEG_INFINITY { SLACK * (1.0 + mesh.abs()) } else { 0.0 };
+    [mesh > last + slack, last > mesh + slack]
 }

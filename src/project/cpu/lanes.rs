@@ -1,8 +1,17 @@
-//! What pieces of rays emit and absorb, eight at a time: the equations are those of [`crate::integral`].
+//! The vectors of the sweep, and what pieces of rays emit and absorb in them: the equations are those of [`crate::integral`].
 
 use crate::integral::{GAUSS_6, MILD, PANEL, Piece};
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x8, u32x8};
+use fearless_simd::{Simd, f32x16, i32x16, mask32x16, u32x16};
+
+/// As wide as the widest instructions: others do it in parts, with the same result.
+pub(super) const LANES: usize = 16;
+pub(super) type Floats<S> = f32x16<S>;
+pub(super) type Ints<S> = i32x16<S>;
+pub(super) type Mask<S> = mask32x16<S>;
+
+/// The lanes' numbers.
+pub(super) const NUMBERS: [i32; LANES] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 
 /// Optical depth up to which the shorter series holds.
 const FAINT: f32 = 1.0 / 8.0;
@@ -10,11 +19,11 @@ const FAINT: f32 = 1.0 / 8.0;
 /// Opacity and the weights of the emission at both ends of pieces of optical depths `x` and `y`. What is below 0 is rounding,
 /// much of it beside great depths, and taken for 0.
 #[inline(always)]
-pub(super) fn piece<S: Simd>(simd: S, x: f32x8<S>, y: f32x8<S>, direct: bool) -> [f32x8<S>; 3] {
-    let zero = f32x8::splat(simd, 0.0);
+pub(super) fn piece<S: Simd>(simd: S, x: Floats<S>, y: Floats<S>, direct: bool) -> [Floats<S>; 3] {
+    let zero = Floats::splat(simd, 0.0);
     let (x, y) = (x.max(zero), y.max(zero));
     let steepest = x.max(y);
-    let most = |depth: f32| steepest.simd_gt(f32x8::splat(simd, depth)).to_bitmask();
+    let most = |depth: f32| steepest.simd_gt(Floats::splat(simd, depth)).to_bitmask();
     if !direct && most(FAINT) == 0 {
         return faint(simd, x, y);
     }
@@ -25,15 +34,15 @@ pub(super) fn piece<S: Simd>(simd: S, x: f32x8<S>, y: f32x8<S>, direct: bool) ->
     let deep = most(PANEL as f32);
     // Faint lanes beside deeper ones keep their digits.
     let [a, f, b] = mild(simd, x, y, direct);
-    let near = steepest.simd_le(f32x8::splat(simd, MILD as f32));
+    let near = steepest.simd_le(Floats::splat(simd, MILD as f32));
     let all = [near.select(a, alpha), near.select(f, front), near.select(b, back)];
     if deep == 0 { all } else { deeper(simd, x, y, direct, deep, all) }
 }
 
 /// Up to a depth of 1/8: [`mild`] with fewer terms; what is left out is below 1e-7 of the opacity.
 #[inline(always)]
-fn faint<S: Simd>(simd: S, x: f32x8<S>, y: f32x8<S>) -> [f32x8<S>; 3] {
-    let one = f32x8::splat(simd, 1.0);
+fn faint<S: Simd>(simd: S, x: Floats<S>, y: Floats<S>) -> [Floats<S>; 3] {
+    let one = Floats::splat(simd, 1.0);
     let (depth, rise) = ((x + y) * 0.5, y - x);
     let (square, h) = (depth * depth, depth * 0.5);
     let q = h * series(simd, h, &[1.0, -0.5, 1.0 / 6.0, -1.0 / 24.0]);
@@ -49,20 +58,20 @@ fn faint<S: Simd>(simd: S, x: f32x8<S>, y: f32x8<S>) -> [f32x8<S>; 3] {
 
 /// c₀ + c₁ x + c₂ x² + …
 #[inline(always)]
-fn series<S: Simd, const K: usize>(simd: S, x: f32x8<S>, c: &[f32; K]) -> f32x8<S> {
-    let mut sum = f32x8::splat(simd, c[K - 1]);
+fn series<S: Simd, const K: usize>(simd: S, x: Floats<S>, c: &[f32; K]) -> Floats<S> {
+    let mut sum = Floats::splat(simd, c[K - 1]);
     for k in (0..K - 1).rev() {
-        sum = x.mul_add(sum, f32x8::splat(simd, c[k]));
+        sum = x.mul_add(sum, Floats::splat(simd, c[k]));
     }
     sum
 }
 
 /// Up to a depth of 1: `Piece::mild`.
 #[inline(always)]
-fn mild<S: Simd>(simd: S, x: f32x8<S>, y: f32x8<S>, direct: bool) -> [f32x8<S>; 3] {
+fn mild<S: Simd>(simd: S, x: Floats<S>, y: Floats<S>, direct: bool) -> [Floats<S>; 3] {
     const Q: [f32; 8] =
         [1.0, -1.0 / 2.0, 1.0 / 6.0, -1.0 / 24.0, 1.0 / 120.0, -1.0 / 720.0, 1.0 / 5040.0, -1.0 / 40_320.0];
-    let one = f32x8::splat(simd, 1.0);
+    let one = Floats::splat(simd, 1.0);
     let (depth, rise) = ((x + y) * 0.5, y - x);
     let (square, h) = (depth * depth, depth * 0.5);
     let q = h * series(simd, h, &Q);
@@ -70,7 +79,7 @@ fn mild<S: Simd>(simd: S, x: f32x8<S>, y: f32x8<S>, direct: bool) -> [f32x8<S>; 
     let once = series(simd, square, &[1.0 / 12.0, 1.0 / 480.0, 1.0 / 53_760.0]);
     let twice = series(simd, square, &[1.0 / 240.0, 1.0 / 13_440.0]);
     let thrice =
-        rise.mul_add(f32x8::splat(simd, 1.0 / 241_920.0), series(simd, square, &[1.0 / 6720.0, 1.0 / 483_840.0]));
+        rise.mul_add(Floats::splat(simd, 1.0 / 241_920.0), series(simd, square, &[1.0 / 6720.0, 1.0 / 483_840.0]));
     let bent = rise.mul_add(rise.mul_add(thrice, twice), once);
     let e = one - q;
     let scaled = e * depth;
@@ -86,8 +95,8 @@ fn mild<S: Simd>(simd: S, x: f32x8<S>, y: f32x8<S>, direct: bool) -> [f32x8<S>; 
 
 /// Up to a depth of 4: Gauss–Legendre sums.
 #[inline(always)]
-fn moderate<S: Simd>(simd: S, x: f32x8<S>, y: f32x8<S>, direct: bool) -> [f32x8<S>; 3] {
-    let zero = f32x8::splat(simd, 0.0);
+fn moderate<S: Simd>(simd: S, x: Floats<S>, y: Floats<S>, direct: bool) -> [Floats<S>; 3] {
+    let zero = Floats::splat(simd, 0.0);
     let mut sum = [zero; 3];
     for [node, weight] in GAUSS_6 {
         let u = node as f32;
@@ -102,22 +111,29 @@ fn moderate<S: Simd>(simd: S, x: f32x8<S>, y: f32x8<S>, direct: bool) -> [f32x8<
 
 /// Any depth, one lane after another.
 #[inline(never)]
-fn deeper<S: Simd>(simd: S, x: f32x8<S>, y: f32x8<S>, direct: bool, lanes: u64, all: [f32x8<S>; 3]) -> [f32x8<S>; 3] {
-    let (x, y): ([f32; 8], [f32; 8]) = (x.into(), y.into());
-    let mut all: [[f32; 8]; 3] = all.map(Into::into);
-    for l in (0..8).filter(|l| lanes >> l & 1 == 1) {
+fn deeper<S: Simd>(
+    simd: S,
+    x: Floats<S>,
+    y: Floats<S>,
+    direct: bool,
+    lanes: u64,
+    all: [Floats<S>; 3],
+) -> [Floats<S>; 3] {
+    let (x, y): ([f32; LANES], [f32; LANES]) = (x.into(), y.into());
+    let mut all: [[f32; LANES]; 3] = all.map(Into::into);
+    for l in (0..LANES).filter(|l| lanes >> l & 1 == 1) {
         let piece = Piece::new(x[l], y[l], direct);
         (all[0][l], all[1][l], all[2][l]) = (piece.alpha, piece.front, piece.back);
     }
-    all.map(|v| f32x8::from_slice(simd, &v))
+    all.map(|v| Floats::from_slice(simd, &v))
 }
 
 /// eˣ for x ≤ 0: `real::exp`.
 #[inline(always)]
 #[allow(clippy::excessive_precision, reason = "ln 2 in two parts: the first is exact in f32")]
-fn exp<S: Simd>(simd: S, x: f32x8<S>) -> f32x8<S> {
+fn exp<S: Simd>(simd: S, x: Floats<S>) -> Floats<S> {
     const ROUND: f32 = 12_582_912.0;
-    let of = |v: f32| f32x8::splat(simd, v);
+    let of = |v: f32| Floats::splat(simd, v);
     let clamped = x.max(of(-87.0));
     let shifted = clamped * std::f32::consts::LOG2_E + ROUND;
     let k = shifted - ROUND;
@@ -126,10 +142,34 @@ fn exp<S: Simd>(simd: S, x: f32x8<S>) -> f32x8<S> {
     for c in [1.0 / 720.0, 1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5, 1.0, 1.0] {
         p = p * r + of(c);
     }
-    let bits: u32x8<S> = shifted.bitcast();
-    let biased = bits - u32x8::splat(simd, ROUND.to_bits() - 127);
-    let scale: f32x8<S> = (biased << 23).bitcast();
+    let bits: u32x16<S> = shifted.bitcast();
+    let biased = bits - u32x16::splat(simd, ROUND.to_bits() - 127);
+    let scale: Floats<S> = (biased << 23).bitcast();
     x.simd_lt(of(-87.0)).select(of(0.0), p * scale)
+}
+
+/// Stores the lanes of `some` one after another, and what else follows them in a whole vector.
+#[inline(always)]
+pub(super) fn keep<S: Simd>(simd: S, v: Floats<S>, some: Mask<S>, to: &mut [f32]) {
+    if size_of::<S::f32s>() == size_of::<Floats<S>>() {
+        return v.compress(some).store_slice(&mut to[..LANES]);
+    }
+    let ((low, high), (first, second)) = (v.split(), simd.split_mask32x16(some));
+    low.compress(first).store_slice(&mut to[..LANES / 2]);
+    let at = (first.to_bitmask().count_ones() as usize).min(LANES / 2);
+    high.compress(second).store_slice(&mut to[at..at + LANES / 2]);
+}
+
+/// As [`keep`].
+#[inline(always)]
+pub(super) fn keep_ints<S: Simd>(simd: S, v: Ints<S>, some: Mask<S>, to: &mut [i32]) {
+    if size_of::<S::f32s>() == size_of::<Floats<S>>() {
+        return v.compress(some).store_slice(&mut to[..LANES]);
+    }
+    let ((low, high), (first, second)) = (v.split(), simd.split_mask32x16(some));
+    low.compress(first).store_slice(&mut to[..LANES / 2]);
+    let at = (first.to_bitmask().count_ones() as usize).min(LANES / 2);
+    high.compress(second).store_slice(&mut to[at..at + LANES / 2]);
 }
 
 #[cfg(test)]
@@ -145,15 +185,15 @@ mod tests {
                 for y in depths {
                     // Alone, and beside deeper ones.
                     for other in [0.0, 0.5, 3.0, 20.0] {
-                        let lanes = |v: f32| [v, v, other, v, other, v, v, v];
-                        let (a, b) = (lanes(x), lanes(y));
+                        let lanes = |v: f32| std::array::from_fn(|l| if l % 5 == 2 { other } else { v });
+                        let (a, b): ([f32; LANES], [f32; LANES]) = (lanes(x), lanes(y));
                         let got = dispatch!(Level::new(), simd => {
-                            piece(simd, f32x8::from_slice(simd, &a), f32x8::from_slice(simd, &b), direct)
-                                .map(<[f32; 8]>::from)
+                            piece(simd, Floats::from_slice(simd, &a), Floats::from_slice(simd, &b), direct)
+                                .map(<[f32; LANES]>::from)
                         });
                         let want = Piece::new(f64::from(x), f64::from(y), direct);
                         for (k, want) in [want.alpha, want.front, want.back].into_iter().enumerate() {
-                            for l in [0, 7] {
+                            for l in [0, LANES - 1] {
                                 let error = (f64::from(got[k][l]) - want).abs();
                                 let bound = if direct && k > 0 {
                                     1e-6

@@ -3,27 +3,24 @@
 //! added to their pixels. No pixel occurs twice in a cell but with pieces of one ray, which are in order.
 
 use super::fine::{Canvas, PIXELS};
-use super::lanes::piece;
+use super::lanes::{Floats, Ints, LANES, Mask, NUMBERS, keep, keep_ints, piece};
 use super::setup::{Record, Scene};
 use crate::integral::{Exact, Integral};
 use crate::view::Blend;
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x4, f32x8, i32x8, mask32x8};
+use fearless_simd::{Simd, f32x4};
 
 /// As many fragments as a tile has pixels, and the lanes beyond the last.
-const ROOM: usize = PIXELS + 8;
+const ROOM: usize = PIXELS + LANES;
 
-/// A cell on more lines of the function than this and one is split fragment by fragment: most are on few of them.
-const MOST_LINES: u16 = 8;
+/// So many lines are tried one after another.
+const FEW_LINES: usize = 3;
 
 /// So many pieces are integrated at a time.
 const ENOUGH: usize = 256;
 
 /// There is room for those of one more cell.
-const WAITING: usize = ENOUGH + ROOM + 8;
-
-/// The lanes' numbers.
-const LANES: [i32; 8] = [0, 1, 2, 3, 4, 5, 6, 7];
+const WAITING: usize = ENOUGH + ROOM + LANES;
 
 /// The fragments of a cell: v ([`super::setup`]) where the ray enters and leaves, and the pixel.
 #[derive(Debug)]
@@ -83,17 +80,18 @@ impl Fragments {
     #[inline(always)]
     pub(super) fn add<S: Simd>(
         &mut self,
+        simd: S,
         at: usize,
-        inside: mask32x8<S>,
-        enter: f32x8<S>,
-        leave: f32x8<S>,
-        pixel: i32x8<S>,
+        inside: Mask<S>,
+        enter: Floats<S>,
+        leave: Floats<S>,
+        pixel: Ints<S>,
     ) -> usize {
-        // Of 128 blocks none begins behind the last pixel but one block.
+        // No block begins behind the last pixel but one block.
         let at = at % PIXELS;
-        enter.compress(inside).store_slice(&mut self.enter[at..at + 8]);
-        leave.compress(inside).store_slice(&mut self.leave[at..at + 8]);
-        pixel.compress(inside).store_slice(&mut self.pixel[at..at + 8]);
+        keep(simd, enter, inside, &mut self.enter[at..at + LANES]);
+        keep(simd, leave, inside, &mut self.leave[at..at + LANES]);
+        keep_ints(simd, pixel, inside, &mut self.pixel[at..at + LANES]);
         inside.to_bitmask().count_ones() as usize
     }
 }
@@ -119,50 +117,50 @@ impl Waiting {
     /// Whether eight pieces more do not fit, with zeros for the lanes beyond the last.
     #[inline(always)]
     fn is_full(&self) -> bool {
-        self.count > WAITING - 16
+        self.count > WAITING - 2 * LANES
     }
 
     /// Keeps up to eight pieces behind the others; `count` says how many they are.
     #[inline(always)]
     fn add<S: Simd>(
         &mut self,
-        depth: [f32x8<S>; 2],
-        value: [f32x8<S>; 2],
-        length: f32x8<S>,
-        id: i32x8<S>,
+        depth: [Floats<S>; 2],
+        value: [Floats<S>; 2],
+        length: Floats<S>,
+        id: Ints<S>,
         count: usize,
     ) {
-        let at = self.count.min(WAITING - 16);
-        depth[0].store_slice(&mut self.depth[0][at..at + 8]);
-        depth[1].store_slice(&mut self.depth[1][at..at + 8]);
-        value[0].store_slice(&mut self.value[0][at..at + 8]);
-        value[1].store_slice(&mut self.value[1][at..at + 8]);
-        length.store_slice(&mut self.length[at..at + 8]);
-        id.store_slice(&mut self.id[at..at + 8]);
+        let at = self.count.min(WAITING - 2 * LANES);
+        depth[0].store_slice(&mut self.depth[0][at..at + LANES]);
+        depth[1].store_slice(&mut self.depth[1][at..at + LANES]);
+        value[0].store_slice(&mut self.value[0][at..at + LANES]);
+        value[1].store_slice(&mut self.value[1][at..at + LANES]);
+        length.store_slice(&mut self.length[at..at + LANES]);
+        id.store_slice(&mut self.id[at..at + LANES]);
         self.count = at + count;
     }
 
     /// Integrates all, in loops of their own: so the processor finds work that does not wait for its like.
     #[inline(always)]
     fn integrate<S: Simd>(&mut self, simd: S, direct: bool) {
-        let count = self.count.min(WAITING - 8);
+        let count = self.count.min(WAITING - LANES);
         // Which series is taken for eight pieces must not depend on what was here before.
         for v in self.depth.iter_mut().chain(&mut self.value).chain([&mut self.length]) {
-            v[count..count + 8].fill(0.0);
+            v[count..count + LANES].fill(0.0);
         }
-        for i in (0..count).step_by(8) {
-            let load = |v: &[f32; WAITING]| f32x8::from_slice(simd, &v[i..i + 8]);
+        for i in (0..count).step_by(LANES) {
+            let load = |v: &[f32; WAITING]| Floats::from_slice(simd, &v[i..i + LANES]);
             let (x, y) = (load(&self.depth[0]), load(&self.depth[1]));
             let [alpha, front, back] = piece(simd, x, y, direct);
             let (f, b) = (load(&self.value[0]), load(&self.value[1]));
             let moment = f.mul_add(front, b * back);
-            alpha.store_slice(&mut self.alpha[i..i + 8]);
+            alpha.store_slice(&mut self.alpha[i..i + LANES]);
             if direct {
                 let length = load(&self.length);
-                ((front + back) * length).store_slice(&mut self.sum[i..i + 8]);
-                (moment * length).store_slice(&mut self.moment[i..i + 8]);
+                ((front + back) * length).store_slice(&mut self.sum[i..i + LANES]);
+                (moment * length).store_slice(&mut self.moment[i..i + LANES]);
             } else {
-                moment.store_slice(&mut self.moment[i..i + 8]);
+                moment.store_slice(&mut self.moment[i..i + LANES]);
             }
         }
     }
@@ -171,35 +169,46 @@ impl Waiting {
     /// their slopes.
     #[inline(always)]
     fn composite<S: Simd>(&mut self, simd: S, light: &mut [[f32; 4]; PIXELS], colors: &[[[f32; 4]; 2]], direct: bool) {
-        let count = std::mem::take(&mut self.count).min(WAITING - 8);
+        let count = std::mem::take(&mut self.count).min(WAITING - LANES);
         let sum = if direct { &self.sum } else { &self.alpha };
-        let absorbed = f32x4::load_array(simd, [0.0, 0.0, 0.0, -1.0]);
-        let pieces = self.id[..count].iter().zip(&sum[..count]).zip(&self.alpha[..count]).zip(&self.moment[..count]);
-        for (((&id, &sum), &alpha), &moment) in pieces {
-            let id = id as u32;
-            let Some([value, slope]) = colors.get((id >> 16) as usize) else { continue };
-            let (value, slope) = (f32x4::load_array_ref(simd, value), f32x4::load_array_ref(simd, slope));
-            let lit = slope.mul_add(f32x4::splat(simd, moment), value * sum);
-            let lit = absorbed.mul_add(f32x4::splat(simd, alpha), lit);
-            let pixel = &mut light[id as usize % PIXELS];
-            let transmittance = f32x4::splat(simd, pixel[3]);
-            transmittance.mul_add(lit, f32x4::load_array_ref(simd, pixel)).store_array(pixel);
+        for i in (0..count).step_by(LANES) {
+            let range = i..i + LANES;
+            let (ids, alpha, sum, moment) =
+                (&self.id[range.clone()], &self.alpha[range.clone()], &sum[range.clone()], &self.moment[range]);
+            let some = (count - i).min(LANES);
+            let line = ids[0] as u32 >> 16;
+            let on_it = (Ints::from_slice(simd, ids) >> 16).simd_eq(Ints::splat(simd, ids[0] >> 16)).to_bitmask();
+            let all = on_it.trailing_ones() as usize >= some;
+            if let (true, Some([value, slope])) = (all, colors.get(line as usize)) {
+                let [alpha, sum, moment] = [alpha, sum, moment].map(|v| Floats::from_slice(simd, v));
+                let color = |c: usize| Floats::splat(simd, slope[c]).mul_add(moment, sum * value[c]);
+                add(simd, light, [color(0), color(1), color(2), alpha], &ids[..some]);
+                continue;
+            }
+            // As above, piece by piece.
+            let absorbed = f32x4::load_array(simd, [0.0, 0.0, 0.0, -1.0]);
+            for (((&id, &sum), &alpha), &moment) in ids[..some].iter().zip(sum).zip(alpha).zip(moment) {
+                let Some([value, slope]) = colors.get((id as u32 >> 16) as usize) else { continue };
+                let (value, slope) = (f32x4::load_array_ref(simd, value), f32x4::load_array_ref(simd, slope));
+                let lit = slope.mul_add(f32x4::splat(simd, moment), value * sum);
+                add_one(simd, light, absorbed.mul_add(f32x4::splat(simd, alpha), lit), id);
+            }
         }
     }
 }
 
-/// Eight rows of four as four columns.
+/// Rows of four as four columns.
 #[inline(always)]
-fn columns<S: Simd>(simd: S, rows: [[f32; 4]; 8]) -> [f32x8<S>; 4] {
+fn columns<S: Simd>(simd: S, rows: [[f32; 4]; LANES]) -> [Floats<S>; 4] {
     let flat = rows.as_flattened();
-    let half = |k: usize| {
+    let four = |k: usize| {
         let mut four = [0.0; 16];
         four.copy_from_slice(&flat[16 * k..16 * k + 16]);
         simd.load_four_interleaved_f32x4(&four)
     };
-    let (low, high) = (half(0), half(1));
-    let both = |c: usize| low[c].combine(high[c]);
-    [both(0), both(1), both(2), both(3)]
+    let all = [four(0), four(1), four(2), four(3)];
+    let column = |c: usize| all[0][c].combine(all[1][c]).combine(all[2][c].combine(all[3][c]));
+    [column(0), column(1), column(2), column(3)]
 }
 
 impl<const N: usize> Canvas<N> {
@@ -207,8 +216,7 @@ impl<const N: usize> Canvas<N> {
     #[inline(always)]
     pub(super) fn measure<S: Simd>(&mut self, simd: S, scene: &Scene<N>, integral: &Integral, r: &Record<N>) {
         let exact = integral.table.is_none() && scene.blend == Blend::Composite;
-        let few = r.lines[1] - r.lines[0] <= MOST_LINES;
-        match (N, exact && few, r.lines[0] == r.lines[1]) {
+        match (N, exact, r.lines[0] == r.lines[1]) {
             (1, true, true) => self.on_one_line(simd, integral.exact, r),
             (1, true, false) => self.on_lines(simd, scene, integral.exact, r),
             _ => {
@@ -232,16 +240,16 @@ impl<const N: usize> Canvas<N> {
 
     /// Depths beyond R's at which eight fragments from `i` on begin and end, their lengths (0 beyond the last), and x and y from R.
     #[inline(always)]
-    fn spans<S: Simd>(&self, simd: S, r: &Record<N>, i: usize) -> [f32x8<S>; 5] {
-        let of = |v: f32| f32x8::splat(simd, v);
+    fn spans<S: Simd>(&self, simd: S, r: &Record<N>, i: usize) -> [Floats<S>; 5] {
+        let of = |v: f32| Floats::splat(simd, v);
         let one = of(1.0);
         let found = &self.found;
-        let enter = f32x8::from_slice(simd, &found.enter[i..i + 8]);
-        let leave = f32x8::from_slice(simd, &found.leave[i..i + 8]);
-        let id = i32x8::from_slice(simd, &found.pixel[i..i + 8]);
+        let enter = Floats::from_slice(simd, &found.enter[i..i + LANES]);
+        let leave = Floats::from_slice(simd, &found.leave[i..i + LANES]);
+        let id = Ints::from_slice(simd, &found.pixel[i..i + LANES]);
         // The inverse of `place`.
-        let column = f32x8::float_from((id & 3) | ((id >> 1) & 28));
-        let row = f32x8::float_from(((id >> 2) & 1) | ((id >> 5) & 30));
+        let column = Floats::float_from((id & 3) | ((id >> 2) & 28));
+        let row = Floats::float_from(((id >> 2) & 3) | ((id >> 5) & 28));
         let c = |k: usize| of(self.stretch[k]);
         let across = column.mul_add(c(3), row.mul_add(c(5), c(1)));
         let square = column.mul_add(across, row.mul_add(row.mul_add(c(4), c(2)), c(0)));
@@ -250,7 +258,7 @@ impl<const N: usize> Canvas<N> {
         let over = one / (p * q);
         let (first, second) = (enter * q * over, leave * p * over);
         let length = (leave - enter) * over * square.sqrt();
-        let there = i32x8::load_array(simd, LANES).simd_lt(i32x8::splat(simd, (found.count - i).min(8) as i32));
+        let there = Ints::load_array(simd, NUMBERS).simd_lt(Ints::splat(simd, (found.count - i).min(LANES) as i32));
         let length = there.select(length, of(0.0));
         // Whole pixels first, which are exact.
         [first, second, length, (column - r.at[0]) - r.rest[0], (row - r.at[1]) - r.rest[1]]
@@ -258,14 +266,14 @@ impl<const N: usize> Canvas<N> {
 
     /// As [`Self::spans`]: the scalar at both ends, and lengths.
     #[inline(always)]
-    fn scalars<S: Simd>(&self, simd: S, r: &Record<N>, i: usize) -> [f32x8<S>; 3] {
-        let of = |v: f32| f32x8::splat(simd, v);
+    fn scalars<S: Simd>(&self, simd: S, r: &Record<N>, i: usize) -> [Floats<S>; 3] {
+        let of = |v: f32| Floats::splat(simd, v);
         let [first, second, length, x, y] = self.spans(simd, r, i);
         let [s, gx, gy, gz] = r.field[0];
         let (low, high) = (of(r.span[0][0]), of(r.span[0][1]));
         let side = x.mul_add(of(gx), y * gy);
         let (base, along) = (side + s, side.mul_add(of(r.kappa), of(gz)));
-        let value = |t: f32x8<S>| t.mul_add(along, base).max(low).min(high);
+        let value = |t: Floats<S>| t.mul_add(along, base).max(low).min(high);
         [value(first), value(second), length]
     }
 
@@ -275,35 +283,42 @@ impl<const N: usize> Canvas<N> {
         let k = usize::from(r.lines[0]);
         let low = exact.opacity.s[k];
         let (value, slope) =
-            (f32x8::splat(simd, exact.opacity.value[k][0]), f32x8::splat(simd, exact.opacity.slope[k][0]));
-        let line = i32x8::splat(simd, (k as i32) << 16);
+            (Floats::splat(simd, exact.opacity.value[k][0]), Floats::splat(simd, exact.opacity.slope[k][0]));
+        let line = Ints::splat(simd, (k as i32) << 16);
         let count = self.found.count.min(PIXELS);
-        for i in (0..count).step_by(8) {
+        for i in (0..count).step_by(LANES) {
             let [front, back, length] = self.scalars(simd, r, i);
             let (f, b) = (front - low, back - low);
             let depth = [f.mul_add(slope, value) * length, b.mul_add(slope, value) * length];
-            let id = i32x8::from_slice(simd, &self.found.pixel[i..i + 8]) | line;
-            self.found.waiting.add(depth, [f, b], length, id, (count - i).min(8));
+            let id = Ints::from_slice(simd, &self.found.pixel[i..i + LANES]) | line;
+            self.found.waiting.add(depth, [f, b], length, id, (count - i).min(LANES));
         }
     }
 
     /// A scalar on several lines of the function: upwards where it rises along the ray, downwards where it falls.
     #[inline(always)]
     fn on_lines<S: Simd>(&mut self, simd: S, scene: &Scene<N>, exact: &Exact<f32>, r: &Record<N>) {
-        let of = |v: f32| f32x8::splat(simd, v);
+        let of = |v: f32| Floats::splat(simd, v);
         let (zero, one) = (of(0.0), of(1.0));
         let knots = &exact.opacity;
-        let [first, last] = r.lines;
-        for i in (0..self.found.count.min(PIXELS)).step_by(8) {
+        for i in (0..self.found.count.min(PIXELS)).step_by(LANES) {
             let [front, back, length] = self.scalars(simd, r, i);
-            let id = i32x8::from_slice(simd, &self.found.pixel[i..i + 8]);
+            let id = Ints::from_slice(simd, &self.found.pixel[i..i + LANES]);
             let there = length.simd_gt(zero);
             let rise = back - front;
             let flat = rise.simd_eq(zero);
             let (least, most) = (front.min(back), front.max(back));
             let mut left = there;
+            // Lines that only the cell's other fragments are on.
+            let [mut first, mut last] = r.lines.map(usize::from);
+            if last - first > FEW_LINES {
+                let low = there.select(least, of(f32::INFINITY)).reduce_min();
+                let high = there.select(most, of(f32::NEG_INFINITY)).reduce_max();
+                first += knots.s[first + 1..=last].iter().take_while(|&&s| s < low).count();
+                last -= knots.s[first + 1..=last].iter().rev().take_while(|&&s| s > high).count();
+            }
             // Most are on one line. A constant is on the one that begins there.
-            for k in usize::from(first)..=usize::from(last) {
+            for k in first..=last {
                 let (low, high) = (of(knots.s[k]), of(knots.s[k + 1]));
                 let within = left & least.simd_ge(low) & most.simd_le(high) & !(flat & most.simd_ge(high));
                 if within.to_bitmask() != 0 {
@@ -322,7 +337,7 @@ impl<const N: usize> Canvas<N> {
                     continue;
                 }
                 for k in first..=last {
-                    let k = usize::from(if falls { first + last - k } else { k });
+                    let k = if falls { first + last - k } else { k };
                     let (low, high) = (of(knots.s[k]), of(knots.s[k + 1]));
                     let ends = [front.max(low).min(high), back.max(low).min(high)];
                     let some = wanted & (ends[0].simd_lt(ends[1]) | ends[1].simd_lt(ends[0]));
@@ -343,10 +358,10 @@ impl<const N: usize> Canvas<N> {
         scene: &Scene<N>,
         exact: &Exact<f32>,
         k: usize,
-        some: mask32x8<S>,
-        ends: [f32x8<S>; 2],
-        length: f32x8<S>,
-        id: i32x8<S>,
+        some: Mask<S>,
+        ends: [Floats<S>; 2],
+        length: Floats<S>,
+        id: Ints<S>,
     ) {
         if self.found.waiting.is_full() {
             self.flush(simd, scene, exact.direct);
@@ -355,7 +370,7 @@ impl<const N: usize> Canvas<N> {
         let (f, b) = ((ends[0] - knots.s[k]).compress(some), (ends[1] - knots.s[k]).compress(some));
         let length = length.compress(some);
         let id = (id | ((k as i32) << 16)).compress(some);
-        let (value, slope) = (f32x8::splat(simd, knots.value[k][0]), f32x8::splat(simd, knots.slope[k][0]));
+        let (value, slope) = (Floats::splat(simd, knots.value[k][0]), Floats::splat(simd, knots.slope[k][0]));
         let depth = [f.mul_add(slope, value) * length, b.mul_add(slope, value) * length];
         self.found.waiting.add(depth, [f, b], length, id, some.to_bitmask().count_ones() as usize);
     }
@@ -363,10 +378,10 @@ impl<const N: usize> Canvas<N> {
     /// Any field and integral, fragment by fragment.
     #[inline(always)]
     fn any<S: Simd>(&mut self, simd: S, scene: &Scene<N>, integral: &Integral, r: &Record<N>) {
-        for i in (0..self.found.count.min(PIXELS)).step_by(8) {
+        for i in (0..self.found.count.min(PIXELS)).step_by(LANES) {
             let spans = simd.vectorize(
                 #[inline(always)]
-                || self.spans(simd, r, i).map(f32x8::to_array),
+                || self.spans(simd, r, i).map(Floats::to_array),
             );
             self.split(scene, integral, r, i, &spans);
             if self.found.parts.len() > ENOUGH {
@@ -384,9 +399,9 @@ impl<const N: usize> Canvas<N> {
         integral: &Integral,
         r: &Record<N>,
         i: usize,
-        [first, second, length, x, y]: &[[f32; 8]; 5],
+        [first, second, length, x, y]: &[[f32; LANES]; 5],
     ) {
-        for l in 0..(self.found.count - i).min(8) {
+        for l in 0..(self.found.count - i).min(LANES) {
             let value = |t: f32| {
                 std::array::from_fn(|n| {
                     let [s, gx, gy, gz] = r.field[n];
@@ -412,21 +427,16 @@ impl<const N: usize> Canvas<N> {
         simd.vectorize(
             #[inline(always)]
             || {
-                for parts in self.found.parts.chunks(8) {
-                    let mut eight = [Part::default(); 8];
-                    eight[..parts.len()].copy_from_slice(parts);
-                    let (front, back) = (columns(simd, eight.map(|p| p.front)), columns(simd, eight.map(|p| p.back)));
-                    let length = f32x8::load_array(simd, eight.map(|p| p.length));
+                for parts in self.found.parts.chunks(LANES) {
+                    let mut some = [Part::default(); LANES];
+                    some[..parts.len()].copy_from_slice(parts);
+                    let (front, back) = (columns(simd, some.map(|p| p.front)), columns(simd, some.map(|p| p.back)));
+                    let length = Floats::load_array(simd, some.map(|p| p.length));
                     let [alpha, f, b] = piece(simd, front[0] * length, back[0] * length, direct);
                     let [f, b] = if direct { [f * length, b * length] } else { [f, b] };
                     let color = |c: usize| front[c].mul_add(f, back[c] * b);
-                    add(
-                        simd,
-                        &mut self.light,
-                        [color(1), color(2), color(3), alpha],
-                        eight.map(|p| p.pixel),
-                        parts.len(),
-                    );
+                    let pixels = some.map(|p| p.pixel);
+                    add(simd, &mut self.light, [color(1), color(2), color(3), alpha], &pixels[..parts.len()]);
                 }
                 self.found.parts.clear();
             },
@@ -434,23 +444,28 @@ impl<const N: usize> Canvas<N> {
     }
 }
 
-/// Adds what up to eight pieces emit and absorb to their pixels, in order.
+/// Adds what pieces emit and absorb (red, green, blue, opacity) to their pixels, in order.
 #[inline(always)]
-fn add<S: Simd>(simd: S, light: &mut [[f32; 4]; PIXELS], lit: [f32x8<S>; 4], pixels: [i32; 8], count: usize) {
-    let [r, g, b, alpha] = lit;
-    let (r, g, b, a) = (r.split(), g.split(), b.split(), (-alpha).split());
-    let mut rows = [[0.0; 16]; 2];
-    simd.store_four_interleaved_f32x4([r.0, g.0, b.0, a.0], &mut rows[0]);
-    simd.store_four_interleaved_f32x4([r.1, g.1, b.1, a.1], &mut rows[1]);
-    let (rows, _) = rows.as_flattened().as_chunks::<4>();
-    let mut one = |l: usize| {
-        let pixel = &mut light[pixels[l] as usize % PIXELS];
-        let transmittance = f32x4::splat(simd, pixel[3]);
-        transmittance.mul_add(f32x4::load_array(simd, rows[l]), f32x4::load_array(simd, *pixel)).store_array(pixel);
+fn add<S: Simd>(simd: S, light: &mut [[f32; 4]; PIXELS], [r, g, b, alpha]: [Floats<S>; 4], pixels: &[i32]) {
+    let quarters = |v: Floats<S>| {
+        let ((a, b), (c, d)) = (v.split().0.split(), v.split().1.split());
+        [a, b, c, d]
     };
-    if count >= 8 {
-        (0..8).for_each(&mut one);
-    } else {
-        (0..count).for_each(&mut one);
+    let (r, g, b, a) = (quarters(r), quarters(g), quarters(b), quarters(-alpha));
+    let mut rows = [[0.0; 16]; LANES / 4];
+    for (k, rows) in rows.iter_mut().enumerate() {
+        simd.store_four_interleaved_f32x4([r[k], g[k], b[k], a[k]], rows);
     }
+    let (rows, _) = rows.as_flattened().as_chunks::<4>();
+    for (&pixel, row) in pixels.iter().zip(rows) {
+        add_one(simd, light, f32x4::load_array_ref(simd, row), pixel);
+    }
+}
+
+/// Adds red, green, blue and less transmittance to a pixel.
+#[inline(always)]
+fn add_one<S: Simd>(simd: S, light: &mut [[f32; 4]; PIXELS], lit: f32x4<S>, pixel: i32) {
+    let pixel = &mut light[pixel as usize % PIXELS];
+    let transmittance = f32x4::splat(simd, pixel[3]);
+    transmittance.mul_add(lit, f32x4::load_array_ref(simd, pixel)).store_array(pixel);
 }

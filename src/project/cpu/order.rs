@@ -28,6 +28,8 @@ struct Node {
     next: [u32; 4],
     /// Number of cells that come before it and have not been drawn.
     before: u32,
+    /// One more than the place of its first pair among the gaps; 0 if it has none.
+    gaps: u32,
 }
 
 /// Has been drawn.
@@ -47,7 +49,7 @@ impl Order {
             place[cell as usize] = i as u32 + 1;
         }
         self.nodes.clear();
-        self.nodes.resize(records.len(), Node { next: [BOUNDARY; 4], before: 0 });
+        self.nodes.resize(records.len(), Node { next: [BOUNDARY; 4], before: 0, gaps: 0 });
         for (i, (r, &cell)) in records.iter().zip(cells).enumerate() {
             if r.look == Look::Empty {
                 continue;
@@ -65,17 +67,27 @@ impl Order {
         }
         self.gaps.clear();
         let gaps = &mut self.gaps;
-        crossings.for_each_gap(|_, a, b| {
+        // Gaps of the last pixel, by their number along its ray: neighbouring pixels mostly have the same.
+        let mut last = [(u32::MAX, u32::MAX); 16];
+        let (mut of_pixel, mut number) = (usize::MAX, 0);
+        crossings.for_each_gap(|pixel, a, b| {
+            if of_pixel != pixel {
+                (of_pixel, number) = (pixel, 0);
+            }
+            let known = std::mem::replace(&mut last[number % 16], (a, b)) == (a, b);
+            number += 1;
             let (a, b) = (place[a as usize], place[b as usize]);
-            // Neighbouring pixels mostly have the same.
-            if a > 0 && b > 0 && gaps.last() != Some(&(a - 1, b - 1)) {
+            if !known && a > 0 && b > 0 {
                 gaps.push((a - 1, b - 1));
             }
         });
         self.gaps.sort_unstable();
         self.gaps.dedup();
-        for &(_, b) in &self.gaps {
+        for (at, &(a, b)) in self.gaps.iter().enumerate() {
             self.nodes[b as usize].before += 1;
+            if at == 0 || self.gaps[at - 1].0 != a {
+                self.nodes[a as usize].gaps = at as u32 + 1;
+            }
         }
         for &cell in cells {
             place[cell as usize] = 0;
@@ -83,6 +95,11 @@ impl Order {
         self.free.clear();
         self.free.extend((0..records.len() as u32).rev().filter(|&i| self.nodes[i as usize].before == 0));
         (self.search, self.left) = (0, records.len());
+    }
+
+    /// Cells behind the faces of cell `i`, or [`BOUNDARY`].
+    pub(super) fn behind(&self, i: usize) -> [u32; 4] {
+        self.nodes[i].next
     }
 
     /// The next cell. Where all that are left wait for each other, the first of them goes on.
@@ -106,8 +123,7 @@ impl Order {
                 self.release(n);
             }
         }
-        if !self.gaps.is_empty() {
-            let from = self.gaps.partition_point(|g| (g.0 as usize) < i);
+        if let Some(from) = (self.nodes[i].gaps as usize).checked_sub(1) {
             for g in from..self.gaps.len() {
                 let (before, after) = self.gaps[g];
                 if before as usize != i {

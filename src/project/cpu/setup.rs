@@ -51,7 +51,7 @@ const TOGETHER: usize = 32;
 
 /// A cell of one tile.
 #[derive(Debug, Clone, Copy)]
-#[repr(align(64))]
+#[repr(align(128))]
 pub(super) struct Record<const N: usize> {
     /// v = plane[0] + plane[1] x + plane[2] y of the four faces; those turned to the eye come first.
     pub(super) plane: [[f32; 4]; 3],
