@@ -17,7 +17,7 @@ pub(crate) mod tests;
 
 use crate::geometry::{Geometry, Values};
 use crate::integral::Integral;
-use crate::order::crossings::{self, Crossings};
+use crate::order::crossings::Crossings;
 use crate::order::screen::{self, Dealt, Lens, PixelBox, TILE};
 use crate::traverse::cpu;
 use crate::view::{Blend, View};

@@ -30,6 +30,7 @@ use crate::mesh::{Mesh, generate};
 use crate::render::{Engine, Renderer};
 use crate::transfer::TransferFunction;
 use crate::view::{Camera, Projection, View};
+use fearless_simd::Level;
 use glam::{DVec3, dvec3};
 
 fn renderer(mesh: &Mesh, engine: Engine) -> Renderer {
@@ -107,6 +108,37 @@ fn the_order_is_right_nearly_everywhere() {
         }
         // Some are in any mesh: 1 of the tetrahedra's 41,704 was seen.
         assert!(redrawn as f64 <= 1e-3 * covered as f64, "{name}: {redrawn} of {covered} pixels drawn again");
+    }
+}
+
+/// What narrower instructions draw differs by rounding alone, for functions of few and of many points.
+#[test]
+#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+fn every_set_of_instructions_draws_the_same() {
+    let best = Level::new();
+    let lower = [best.as_avx2().map(Level::Avx2), best.as_sse2().map(Level::Sse2)];
+    let mesh = generate::demo(4);
+    let field = Field::from_array(&mesh.point_arrays()[0], Association::Point, Component::All).unwrap();
+    let [lo, hi] = field.range(0);
+    let view = view(dvec3(1.3, 0.7, 4.0), [96; 2]);
+    for points in [2, 5, 300] {
+        let knot = |i: u32| (lo + (hi - lo) * f64::from(i) / f64::from(points), f64::from(i % 3) * 0.4);
+        let transfer =
+            TransferFunction::new(vec![(lo, [0.2; 3]), (hi, [1.0; 3])], (0..=points).map(knot).collect(), 1.0);
+        let transfer = transfer.unwrap();
+        let mut draw = |engine: Engine, level: Option<Level>| {
+            let mut renderer = renderer(&mesh, engine);
+            renderer.set_transfer(&transfer);
+            if let (Some(level), Some(sweep)) = (level, renderer.backend().sweep()) {
+                sweep.level = level;
+            }
+            renderer.render(&view, &|_| ()).unwrap()
+        };
+        let walk = draw(Engine::Traverse, None);
+        for level in lower.into_iter().flatten().chain([best]) {
+            let d = draw(Engine::Project, Some(level)).compare(&walk).unwrap();
+            assert!(d.max <= 1e-5, "{points} points, {level:?}: {d:?}");
+        }
     }
 }
 
