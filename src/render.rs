@@ -204,6 +204,8 @@ impl Renderer {
             self.integral = integral;
             // Values may have to be in the range of tables.
             self.exact = None;
+            self.extra.forget_function();
+            self.grid.iter_mut().for_each(LoadedGrid::forget_function);
             (self.key, self.waits, self.host_builds) = (None, integral.form != Form::Auto, false);
         }
     }
@@ -474,7 +476,7 @@ impl Renderer {
         self.stats.device_ms = device_ms;
         self.stats.steps = counts.steps;
         self.stats.repaired_rays = counts.repaired;
-        (self.stats.cpu_rays, self.stats.panels) = (counts.unfinished, 0);
+        (self.stats.cpu_rays, self.stats.panels, self.stats.culled_cells) = (counts.unfinished, 0, 0);
         (self.stats.projection, self.stats.sweep) = (projection, sweep);
         self.stats.frame_ms = ms(start);
         self.stay.draw();

@@ -31,6 +31,8 @@ pub struct Choice {
     pub texels: Texels,
     /// Where tables are built for a device.
     pub build: Build,
+    /// How segments of two variables, or with light, are integrated.
+    pub two: Two,
 }
 
 impl Default for Choice {
@@ -46,6 +48,7 @@ impl Default for Choice {
             per_cell: false,
             texels: Texels::default(),
             build: Build::default(),
+            two: Two::default(),
         }
     }
 }
@@ -93,6 +96,78 @@ impl Form {
     pub fn is_of_second_order(self) -> bool {
         matches!(self, Form::SecondOrder | Form::SecondOrderPolynomial)
     }
+}
+
+/// How segments of two variables, or with light, are integrated, and what differs between published variants.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
+pub struct Two {
+    /// The method.
+    pub method: Method,
+    /// Pieces of a segment in a cell that is [`Method::Segmented`], from 1 to [`MOST_PIECES`]; Song et al. take 10.
+    pub pieces: u32,
+    /// Where such a piece's weights come from.
+    pub weights: Weights,
+    /// Which cells are left out, as nothing of them can be seen.
+    pub culling: Culling,
+}
+
+/// The most pieces of a segment.
+pub const MOST_PIECES: u32 = 10_000;
+
+impl Default for Two {
+    fn default() -> Self {
+        Two { method: Method::default(), pieces: 10, weights: Weights::default(), culling: Culling::default() }
+    }
+}
+
+/// How a segment of two variables, or with light, is integrated.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// In closed form where that is faster, else in as many panels as the error asks for.
+    #[default]
+    Adaptive,
+    /// In closed form wherever there is one (Song et al. 2009, §4, without their tables): where one widget emits alone,
+    /// unlit, with extinction for opacity. Else as [`Method::Adaptive`].
+    Analytic,
+    /// In a fixed number of equal pieces, classified at their ends (Song et al. 2009, §5).
+    Segmented,
+}
+
+impl Method {
+    /// All, by the names that they have in scenes.
+    pub const ALL: [(&'static str, Method); 3] =
+        [("adaptive", Method::Adaptive), ("analytic", Method::Analytic), ("segmented", Method::Segmented)];
+
+    /// The name that it has in scenes.
+    pub fn name(self) -> &'static str {
+        Method::ALL.into_iter().find(|m| m.1 == self).map_or("", |m| m.0)
+    }
+}
+
+/// Where the weights of the light at a piece's ends come from.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Weights {
+    /// Their closed form.
+    #[default]
+    Closed,
+    /// A texture of 256 × 256 texels over the depths at both ends, up to 8 (Song et al. 2009, equation 3).
+    Texture,
+}
+
+/// Which cells are left out, as nothing of them can be seen with a function of two variables.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Culling {
+    /// Those of whose values, the hull of the pairs at their corners, none meets the function.
+    #[default]
+    Hull,
+    /// Those whose corners do not meet it (Song et al. 2009, §3.1): what is between them is lost.
+    Corners,
+    /// None.
+    None,
 }
 
 /// How polynomials' opacity depends on the length.

@@ -16,17 +16,29 @@
 //! optical depth is at most 0.3, are one panel of three nodes, exact for degree 5.
 
 mod closed;
+mod cull;
+mod direct;
+mod lanes;
 mod light;
+mod nodes;
 mod panel;
+mod segmented;
+mod special;
 
 use super::Light as Gathered;
+use super::choice::{Method, Two};
 use crate::field::Normal;
-use crate::transfer::bivariate::{Shape, Source, Table, Widget};
+use crate::transfer::bivariate::{Shape, Source, Table, Wave, Widget};
 use crate::transfer::shading::{Light, Shading};
 use crate::transfer::{Bivariate, Convention, Emission, TransferFunction};
-use closed::Erf;
+use closed::{Profile, Turn};
+pub(crate) use cull::Pairs;
+use cull::Solid;
+use direct::Seen;
 use glam::DVec3;
 use panel::Rules;
+use segmented::Ends;
+use special::Erf;
 
 /// Extinction, times the unit distance, of what is opaque.
 const SOLID: f64 = 1e8;
@@ -40,6 +52,7 @@ pub(crate) const LONGEST: f64 = 3.5;
 /// A transfer function of two variables, or with light, made ready for the fields of one mesh.
 #[derive(Debug, Clone)]
 pub(crate) struct Second {
+    solid: Solid,
     source: Ready,
     /// The function h(g), if there is one.
     factor: Vec<(f64, f64)>,
@@ -55,10 +68,17 @@ pub(crate) struct Second {
     direct: Option<f64>,
     /// What values are mapped by: of s and of g.
     normal: [Normal; 2],
+    two: Two,
+    /// Of segments in equal pieces.
+    ends: Ends,
     /// What lengths of gradients as they are handed over are as good as none.
     flat: f64,
-    erf: Erf,
+    erf: &'static Erf,
     rules: Rules,
+    /// See [`panel::cosines`].
+    cosines: [f64; 2],
+    /// See [`light::is_even`].
+    is_even: bool,
 }
 
 /// What says colour and opacity.
@@ -69,24 +89,24 @@ enum Ready {
     Table(Table),
 }
 
-/// A widget, the box outside of which nothing is seen of it, and the phases, from 0 to 1, at which its wave turns.
+/// A widget, the box outside of which nothing is seen of it, and what its wave is, if it is one.
 #[derive(Debug, Clone)]
 struct Bounded {
     widget: Widget,
     support: [[f64; 2]; 2],
-    turns: Vec<f64>,
+    wave: Option<(Wave, Profile)>,
+    /// See [`reach`].
+    reach: Option<f64>,
 }
 
 impl Bounded {
-    fn new(widget: &Widget, support: [[f64; 2]; 2]) -> Self {
-        let mut turns = vec![];
-        if let Some((wave, turn)) = closed::wave(&widget.shape) {
-            turns.extend(turn.kinks());
-            if wave.floor > 0.0 {
-                turns.extend(turn.reaches(wave.floor));
-            }
+    fn new(widget: &Widget, transfer: &TransferFunction, longest: f64) -> Self {
+        Bounded {
+            widget: widget.clone(),
+            support: support(widget, transfer, longest),
+            wave: closed::wave(&widget.shape),
+            reach: reach(widget, transfer, longest),
         }
-        Bounded { widget: widget.clone(), support, turns }
     }
 
     /// Where along a segment it may be seen; none if nowhere.
@@ -161,16 +181,21 @@ pub(crate) fn places(transfer: &TransferFunction, longest: f64) -> [[f64; 2]; 2]
     [s, g]
 }
 
-/// The box of a widget, a Gaussian's as far as anything of it can be seen along rays of `longest` world units.
-fn support(widget: &Widget, transfer: &TransferFunction, longest: f64) -> [[f64; 2]; 2] {
-    let Shape::Gaussian { center, sigma } = widget.shape else { return widget.domain };
+/// By how many σ rays of `longest` world units see a Gaussian; without, all of it is.
+fn reach(widget: &Widget, transfer: &TransferFunction, longest: f64) -> Option<f64> {
     // What is emitted whatever the opacity has no tail.
-    if transfer.emission() != Emission::Chromatic {
-        return widget.domain;
+    if !matches!(widget.shape, Shape::Gaussian { .. }) || transfer.emission() != Emission::Chromatic {
+        return None;
     }
     let depth = widget.opacity * longest / transfer.unit_distance();
     // Where the depth of the longest ray is TAIL.
-    let reach = (2.0 * (depth / TAIL).ln().max(0.0)).sqrt();
+    Some((2.0 * (depth / TAIL).ln().max(0.0)).sqrt())
+}
+
+/// The box of a widget, a Gaussian's as far as anything of it can be seen along rays of `longest` world units.
+fn support(widget: &Widget, transfer: &TransferFunction, longest: f64) -> [[f64; 2]; 2] {
+    let Shape::Gaussian { center, sigma } = widget.shape else { return widget.domain };
+    let Some(reach) = reach(widget, transfer, longest) else { return widget.domain };
     [0, 1].map(|k| {
         let [lo, hi] = widget.domain[k];
         [lo.max(center[k] - reach * sigma[k]), hi.min(center[k] + reach * sigma[k])]
@@ -184,6 +209,11 @@ impl Segment {
     }
 }
 
+/// Where a segment is around a Gaussian's centre, and by how much that rises, in units of σ.
+fn in_sigmas(segment: &Segment, center: &[f64; 2], sigma: &[f64; 2]) -> [[f64; 2]; 2] {
+    [[0, 1].map(|k| (segment.at[k] - center[k]) / sigma[k]), [0, 1].map(|k| segment.rise[k] / sigma[k])]
+}
+
 /// The next place beyond `u` where something begins or ends; none if nothing does.
 fn next_end(clips: &[Clip], u: f64) -> Option<f64> {
     let ends = clips.iter().flat_map(|c| c.ends).filter(|&end| end > u);
@@ -193,10 +223,10 @@ fn next_end(clips: &[Clip], u: f64) -> Option<f64> {
 impl Second {
     /// Prepares `transfer` for values mapped by `normal`, those of s and of g, and gradients of a length up to 1, on a
     /// mesh whose coordinates were made (world − `centre`) · `scale`.
-    pub(crate) fn new(transfer: &TransferFunction, normal: [Normal; 2], centre: DVec3, scale: f64) -> Self {
+    pub(crate) fn new(transfer: &TransferFunction, normal: [Normal; 2], centre: DVec3, scale: f64, two: Two) -> Self {
         let source = match transfer.bivariate().map(Bivariate::source) {
             Some(Source::Widgets(widgets)) => {
-                let bounded = |w: &Widget| Bounded::new(w, support(w, transfer, LONGEST / scale));
+                let bounded = |w: &Widget| Bounded::new(w, transfer, LONGEST / scale);
                 Ready::Widgets(widgets.iter().map(bounded).collect())
             }
             Some(Source::Table(table)) => Ready::Table(table.clone()),
@@ -207,9 +237,12 @@ impl Second {
             },
         };
         let moved = |light: &Light| Light { origin: light.origin.moved(centre, scale), ..*light };
+        let factor = transfer.bivariate().and_then(Bivariate::gradient_opacity).unwrap_or_default().to_vec();
+        let is_direct = transfer.emission() != Emission::Chromatic;
         Second {
+            solid: Solid::new(&source, &factor, is_direct),
             source,
-            factor: transfer.bivariate().and_then(Bivariate::gradient_opacity).unwrap_or_default().to_vec(),
+            factor,
             shading: transfer.shading().cloned(),
             lights: transfer.shading().map_or(vec![], |s| s.lights().iter().map(moved).collect()),
             scale,
@@ -220,20 +253,30 @@ impl Second {
                 Emission::Direct { scale: e } => Some(e / scale),
             },
             normal,
+            two,
+            ends: Ends::new(&two, is_direct),
             flat: 1e-12,
-            erf: Erf::default(),
+            erf: Erf::shared(),
             rules: Rules::default(),
+            cosines: panel::cosines(transfer.shading()),
+            is_even: transfer.shading().is_none_or(light::is_even),
         }
     }
 
     /// Adds `segment` to `light`.
+    #[inline(always)]
     pub(crate) fn add(&self, segment: &Segment, scratch: &mut Scratch, light: &mut Gathered<f32>) {
         // Of many panels, f32 would round each.
         let mut own = Gathered::none();
-        self.gather(segment, scratch, &mut own);
+        if self.two.method == Method::Segmented {
+            self.add_segmented(segment, self.two.pieces, scratch, &mut own);
+        } else {
+            self.gather(segment, scratch, &mut own);
+        }
         light.add(own.color.map(|c| c as f32), (1.0 - own.through) as f32);
     }
 
+    #[inline(always)]
     fn gather(&self, segment: &Segment, scratch: &mut Scratch, light: &mut Gathered<f64>) {
         let Ready::Widgets(widgets) = &self.source else {
             self.smooth(segment, [0.0, 1.0], scratch, light);
@@ -251,11 +294,8 @@ impl Second {
             scratch.active.extend(active.map(|c| c.widget));
             match scratch.active[..] {
                 [] => {}
-                [one] if self.has_closed(&widgets[one].widget) => {
-                    let widget = &widgets[one].widget;
-                    let depth = self.depth(widget, segment, [u, next]);
-                    let opacity = -(-depth).exp_m1();
-                    light.add(widget.color.map(|c| c * opacity), opacity);
+                [one] if self.has_closed(&widgets[one], segment, [u, next]) => {
+                    self.add_closed(&widgets[one], segment, [u, next], light);
                 }
                 _ => self.smooth(segment, [u, next], scratch, light),
             }
@@ -263,36 +303,73 @@ impl Second {
         }
     }
 
-    /// Whether the depth of `widget` is known in closed form, and with it its light.
-    fn has_closed(&self, widget: &Widget) -> bool {
-        if self.direct.is_some() || self.shading.is_some() || !self.factor.is_empty() {
+    /// Whether the light of a widget alone between two places is known in closed form, and that is as fast as panels.
+    fn has_closed(&self, bounded: &Bounded, segment: &Segment, ends: [f64; 2]) -> bool {
+        if self.shading.is_some() || !self.factor.is_empty() {
             return false;
         }
-        match &widget.shape {
-            Shape::Uniform => true,
-            Shape::Gaussian { .. } => self.convention == Convention::Extinction,
-            Shape::Triangle(wave) | Shape::Sinusoid(wave, _) => {
-                self.convention == Convention::Extinction && wave.floor == 0.0
-            }
+        if matches!(bounded.widget.shape, Shape::Uniform) {
+            return true;
+        }
+        // A logarithm of what bends has none.
+        if self.convention == Convention::Opacity {
+            return false;
+        }
+        match (&bounded.wave, self.direct) {
+            (_, None) => true,
+            (Some((_, profile)), Some(_)) if profile.turn == Turn::Triangle => true,
+            _ => self.two.method == Method::Analytic || !self.is_short(bounded, segment, ends),
         }
     }
 
-    /// The optical depth of `widget` alone between two places of a segment.
-    fn depth(&self, widget: &Widget, segment: &Segment, ends: [f64; 2]) -> f64 {
-        let whole = self.extinction(widget.opacity) * segment.length / self.unit;
-        let share = match &widget.shape {
-            Shape::Uniform => ends[1] - ends[0],
-            Shape::Gaussian { center, sigma } => {
-                let x = [0, 1].map(|k| (segment.at[k] - center[k]) / sigma[k]);
-                let d = [0, 1].map(|k| segment.rise[k] / sigma[k]);
+    /// Adds the light of a widget alone between two places, for which [`Self::has_closed`].
+    fn add_closed(&self, bounded: &Bounded, segment: &Segment, ends: [f64; 2], light: &mut Gathered<f64>) {
+        let color = bounded.widget.color;
+        if let Some(shining) = self.direct {
+            let seen = self.seen(bounded, segment, ends);
+            let emitted = shining * segment.length * seen.length;
+            light.add(color.map(|c| c * emitted), -(-seen.depth).exp_m1());
+        } else {
+            let opacity = -(-self.depth(bounded, segment, ends)).exp_m1();
+            light.add(color.map(|c| c * opacity), opacity);
+        }
+    }
+
+    /// The optical depth, over a whole segment, of what is as opaque as a widget at its peak.
+    fn depth_of_peak(&self, widget: &Widget, segment: &Segment) -> f64 {
+        self.extinction(widget.opacity) * segment.length / self.unit
+    }
+
+    /// The optical depth of a widget alone between two places of a segment.
+    fn depth(&self, bounded: &Bounded, segment: &Segment, ends: [f64; 2]) -> f64 {
+        let length = ends[1] - ends[0];
+        let share = match (&bounded.widget.shape, &bounded.wave) {
+            (Shape::Gaussian { center, sigma }, _) => {
+                let [x, d] = in_sigmas(segment, center, sigma);
                 self.erf.gaussian(x, d, ends)
             }
-            shape => closed::wave(shape).map_or(0.0, |(wave, turn)| {
+            (_, Some((wave, profile))) => {
                 let [p, q] = ends.map(|u| wave.phase(segment.values(u)));
-                turn.mean(p, q) * (ends[1] - ends[0])
-            }),
+                profile.mean(p, q) * length
+            }
+            _ => length,
         };
-        whole * share
+        self.depth_of_peak(&bounded.widget, segment) * share
+    }
+
+    /// The same, and what is seen of the length between them, as a share of the segment.
+    fn seen(&self, bounded: &Bounded, segment: &Segment, ends: [f64; 2]) -> Seen {
+        let (depth, length) = (self.depth_of_peak(&bounded.widget, segment), ends[1] - ends[0]);
+        match (&bounded.widget.shape, &bounded.wave) {
+            (Shape::Gaussian { center, sigma }, _) => {
+                let [x, d] = in_sigmas(segment, center, sigma);
+                Seen::gaussian(self.erf, depth, x, d, ends)
+            }
+            (_, Some((wave, profile))) => {
+                Seen::wave(profile, depth, ends.map(|u| wave.phase(segment.values(u))), length)
+            }
+            _ => Seen::uniform(depth * length, length),
+        }
     }
 
     /// Extinction times the unit distance, at an opacity.

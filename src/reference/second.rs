@@ -244,10 +244,23 @@ impl Reference<'_> {
             Some(Source::Widgets(widgets)) => {
                 for widget in widgets {
                     if let Shape::Triangle(wave) | Shape::Sinusoid(wave, _) = &widget.shape {
-                        // Waves turn at halves of their phase.
-                        let ends = [0, 1].map(|end| 2.0 * wave.phase([s[end], g[end]]));
+                        // Waves turn at halves of their phase; peaks may begin and end anywhere.
+                        let per_phase = if wave.floor > 0.0 { 64.0 } else { 2.0 };
+                        let ends = [0, 1].map(|end| per_phase * wave.phase([s[end], g[end]]));
                         let [lo, hi] = [ends[0].min(ends[1]).ceil(), ends[0].max(ends[1]).floor()];
                         (0..=(hi - lo).clamp(-1.0, 1e5) as i64).for_each(|i| cut(ends, lo + i as f64));
+                    }
+                }
+                for widget in widgets {
+                    let Shape::Gaussian { center, sigma } = widget.shape else { continue };
+                    // Sums of eight could pass by a narrow one.
+                    let ends = [(s, 0), (g, 1)].map(|(ends, k)| ends.map(|x| (x - center[k]) / sigma[k]));
+                    let rise = ends.map(|[from, to]| to - from);
+                    let square = rise[0] * rise[0] + rise[1] * rise[1];
+                    let nearest = -(ends[0][0] * rise[0] + ends[1][0] * rise[1]) / square;
+                    for away in [-8.0, -4.0, -2.0, 0.0, 2.0, 4.0, 8.0] {
+                        let u = nearest + away / square.sqrt();
+                        cut([-u, 1.0 - u], 0.0);
                     }
                 }
                 for Widget { domain, .. } in widgets {

@@ -185,7 +185,7 @@ impl Renderer {
         if of_two {
             let OnGrid { field, samples, extra, .. } = &mut *field;
             super::second::check(field, transfer, view.blend())?;
-            self.pool.install(|| extra.prepare(&grid.volume, samples, field, transfer))?;
+            self.pool.install(|| extra.prepare(&grid.volume, samples, field, transfer, self.integral.two))?;
         }
         let field = &*field;
         let exact = field.exact.as_ref().ok_or_else(|| missing("transfer function"))?;
@@ -216,7 +216,7 @@ impl Renderer {
         stats.panels = panels;
         stats.device_bytes = grid.volume.bytes() + field.samples.bytes() + field.extra.bytes();
         (stats.steps, stats.repaired_rays, stats.cpu_rays) = (steps, 0, 0);
-        let own = if of_two { "adaptive" } else { Form::Exact.name() };
+        let own = if of_two { self.integral.two.method.name() } else { Form::Exact.name() };
         stats.integral = built.as_ref().map_or(own, |b| b.table.choice().form.name()).into();
         stats.table_ms = built.as_ref().map_or(0.0, |b| b.ms);
         stats.table_bytes = built.as_ref().map_or(0, |b| b.table.bytes());

@@ -6,13 +6,15 @@ use crate::error::{Error, Result};
 use crate::field::gradient::length;
 use crate::field::normal::MOST;
 use crate::field::{Association, Field, Gradient, Kind, Normal};
-use crate::geometry::Values;
+use crate::geometry::{Geometry, Values};
 use crate::image::Image;
-use crate::integral::second::{LONGEST, Second, places};
+use crate::integral::choice::{Culling, Two};
+use crate::integral::second::{LONGEST, Pairs, Second, places};
 use crate::transfer::TransferFunction;
 use crate::transfer::bivariate::{Bivariate, Source};
 use crate::traverse::cpu::render_two;
 use crate::view::{Blend, View};
+use rayon::prelude::*;
 use std::time::Instant;
 
 /// By how much less of the range of values must count for other maps to be better.
@@ -25,6 +27,17 @@ pub(super) struct Extra {
     gradient: Option<Gradient>,
     values: Option<Ready>,
     function: Option<Second>,
+    seen: Option<Seen>,
+}
+
+/// Which cells may be seen with the function of now.
+#[derive(Debug)]
+pub(super) struct Seen {
+    culling: Culling,
+    /// A bit for each.
+    bits: Vec<u64>,
+    culled: u64,
+    ms: f64,
 }
 
 /// Values, and how they are mapped: s and g.
@@ -54,15 +67,16 @@ impl Renderer {
         }
         let field = self.field.as_ref().ok_or_else(|| missing("field"))?.field();
         let transfer = self.transfer.as_ref().ok_or_else(|| missing("transfer function"))?;
-        let extra = &mut self.extra;
+        let (extra, two) = (&mut self.extra, self.integral.two);
         let mesh = &*mesh;
         let drawn = self.pool.install(|| {
-            let (values, second) = extra.prepare(mesh, field, transfer, view.blend())?;
-            Ok::<_, Error>(draw(mesh, values, second, view, progress))
+            let (values, second, seen) = extra.prepare(mesh, field, transfer, view.blend(), two)?;
+            let culled = seen.map_or((0, 0.0), |s| (s.culled, s.ms));
+            Ok::<_, Error>((draw(mesh, values, second, seen, view, progress), culled))
         });
-        let Drawn { pixels, counts, .. } = drawn?;
+        let (Drawn { pixels, counts, .. }, (culled_cells, culling_ms)) = drawn?;
         self.stats = Stats {
-            integral: "adaptive".into(),
+            integral: two.method.name().into(),
             table_ms: 0.0,
             table_bytes: 0,
             knots_per_cell: 0.0,
@@ -70,6 +84,8 @@ impl Renderer {
             repaired_rays: counts.repaired,
             cpu_rays: 0,
             panels: counts.panels,
+            culled_cells,
+            culling_ms,
             device_bytes: mesh.geometry.bytes() + self.extra.bytes(),
             uploaded_bytes: 0,
             device_ms: None,
@@ -99,12 +115,13 @@ impl Extra {
 
     /// The transfer function is another.
     pub(super) fn forget_function(&mut self) {
-        self.function = None;
+        (self.function, self.seen) = (None, None);
     }
 
     /// Bytes held.
     pub(super) fn bytes(&self) -> u64 {
-        self.gradient.as_ref().map_or(0, Gradient::bytes) + self.values.as_ref().map_or(0, |v| v.values.bytes())
+        let seen = self.seen.as_ref().map_or(0, |s| 8 * s.bits.len() as u64);
+        self.gradient.as_ref().map_or(0, Gradient::bytes) + self.values.as_ref().map_or(0, |v| v.values.bytes()) + seen
     }
 
     /// Makes what is missing to draw `field` on `mesh` with `transfer`, on the current rayon pool.
@@ -118,7 +135,8 @@ impl Extra {
         field: &Field,
         transfer: &TransferFunction,
         blend: Blend,
-    ) -> Result<(&TwoOrFive, &Second)> {
+        two: Two,
+    ) -> Result<(&TwoOrFive, &Second, Option<&Seen>)> {
         check(field, transfer, blend)?;
         let lit = transfer.shading().is_some();
         let needs = lit || transfer.bivariate().is_some() && field.second().is_none();
@@ -150,15 +168,22 @@ impl Extra {
             matches!(ready.values, TwoOrFive::Five(_)) == lit && (0..2).all(|k| close(ready.normal[k], normal[k]))
         };
         if !self.values.as_ref().is_some_and(good) {
-            self.function = None;
+            self.forget_function();
             let values = self.gather(mesh, field, normal, lit);
             self.values = Some(Ready { normal, values });
         }
         let Some(ready) = &self.values else { return Err(Error::Render("there are no values to draw".into())) };
-        let function = self
-            .function
-            .get_or_insert_with(|| Second::new(transfer, ready.normal, mesh.geometry.centre, mesh.geometry.scale));
-        Ok((&ready.values, function))
+        let Geometry { centre, scale, .. } = mesh.geometry;
+        let function = self.function.get_or_insert_with(|| Second::new(transfer, ready.normal, centre, scale, two));
+        if two.culling == Culling::None {
+            self.seen = None;
+        } else if self.seen.as_ref().is_none_or(|s| s.culling != two.culling) {
+            self.seen = Some(match &ready.values {
+                TwoOrFive::Two(v) => Seen::new(&mesh.geometry, v, function, two.culling),
+                TwoOrFive::Five(v) => Seen::new(&mesh.geometry, v, function, two.culling),
+            });
+        }
+        Ok((&ready.values, function, self.seen.as_ref()))
     }
 
     /// The values in the order of the mesh.
@@ -197,6 +222,30 @@ impl Extra {
     }
 }
 
+impl Seen {
+    /// Judges all cells, on the current rayon pool.
+    fn new<const N: usize>(geometry: &Geometry, values: &Values<N>, second: &Second, culling: Culling) -> Self {
+        let start = Instant::now();
+        let cells = geometry.cells.len();
+        let own = |v: &[f32; N]| second.own([v[0], v[1]].map(f64::from));
+        let is_seen = |cell: usize| {
+            let pairs: Pairs = match values {
+                Values::Point(v) => geometry.cells[cell].corners.map(|p| own(&v[p as usize])),
+                Values::Corner(v) => v[cell].each_ref().map(own),
+                Values::Cell(v) => [own(&v[cell]); 4],
+            };
+            if culling == Culling::Corners { second.is_seen_at_a_corner(&pairs) } else { second.may_be_seen(&pairs) }
+        };
+        let word = |word: usize| {
+            let bit = |i: usize| u64::from(is_seen(64 * word + i)) << i;
+            (0..(cells - 64 * word).min(64)).map(bit).sum::<u64>()
+        };
+        let bits: Vec<u64> = (0..cells.div_ceil(64)).into_par_iter().with_min_len(64).map(word).collect();
+        let seen: u64 = bits.iter().map(|w| u64::from(w.count_ones())).sum();
+        Seen { culling, bits, culled: cells as u64 - seen, ms: ms(start) }
+    }
+}
+
 /// Refuses what has no second variable and no light: a maximum, fields of several components, and what fields of cells have
 /// not.
 pub(super) fn check(field: &Field, transfer: &TransferFunction, blend: Blend) -> Result<()> {
@@ -221,10 +270,18 @@ pub(super) fn check(field: &Field, transfer: &TransferFunction, blend: Blend) ->
 }
 
 /// Draws a frame on the current rayon pool.
-pub(super) fn draw(mesh: &Loaded, values: &TwoOrFive, second: &Second, view: &View, progress: &Progress) -> Drawn {
+fn draw(
+    mesh: &Loaded,
+    values: &TwoOrFive,
+    second: &Second,
+    seen: Option<&Seen>,
+    view: &View,
+    progress: &Progress,
+) -> Drawn {
+    let seen = seen.map(|s| &s.bits[..]);
     let (image, counts) = match values {
-        TwoOrFive::Two(v) => render_two(&mesh.geometry, v, second, view, progress),
-        TwoOrFive::Five(v) => render_two(&mesh.geometry, v, second, view, progress),
+        TwoOrFive::Two(v) => render_two(&mesh.geometry, v, second, seen, view, progress),
+        TwoOrFive::Five(v) => render_two(&mesh.geometry, v, second, seen, view, progress),
     };
     Drawn { pixels: image.pixels, counts, ..Drawn::default() }
 }

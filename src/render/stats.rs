@@ -38,6 +38,10 @@ pub struct Stats {
     pub cpu_rays: u64,
     /// Panels that segments of two variables, or with light, were summed up in, over all rays of the last frame.
     pub panels: u64,
+    /// Cells of which nothing can be seen with a function of two variables, which the last frame left out.
+    pub culled_cells: u64,
+    /// Finding them, in ms, after the last edit.
+    pub culling_ms: f64,
     /// Memory held on the device for mesh and field, in bytes.
     pub device_bytes: u64,
     /// What had to be handed to the device for the last frame, in bytes; 0 on the CPU.

@@ -230,6 +230,11 @@ impl Table {
         self.ranges
     }
 
+    /// Whether a texel is not clear.
+    pub(crate) fn is_seen(&self, column: usize, row: usize) -> bool {
+        self.texels[column + self.size[0] * row][3] > 0.0
+    }
+
     /// Where (s, g) is, counted in texels from the centre of the first; not limited to the centres.
     pub fn place(&self, at: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|k| {

@@ -62,15 +62,17 @@ pub fn render<const N: usize>(
     render_with(geometry, values, &|| One::new(integral), pixel, view, progress)
 }
 
-/// Draws a frame whose segments are of two variables, or with light: `values` are s and g, or those and the gradient.
+/// Draws a frame whose segments are of two variables, or with light: `values` are s and g, or those and the gradient;
+/// `seen` has a bit for each cell that may be seen.
 pub(crate) fn render_two<const N: usize>(
     geometry: &Geometry,
     values: &Values<N>,
     second: &Second,
+    seen: Option<&[u64]>,
     view: &View,
     progress: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
 ) -> (Image, Counts) {
-    render_with(geometry, values, &|| Two::new(second), &|_| [0.0; 4], view, progress)
+    render_with(geometry, values, &|| Two::new(second, seen), &|_| [0.0; 4], view, progress)
 }
 
 fn render_with<const N: usize, S: Segments<N>>(
@@ -352,6 +354,9 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
         let Entry { t, points: mut ids, mut cell, mut face } = self.entries[e];
         let (mut t, mut reached, mut weights) = (t, t_min, face.weights());
         let mut front = self.value(cell, &ids, &weights);
+        // Values that jump between cells are not those of the cell before, nor are they where that was skipped.
+        let own = !matches!(self.values, Values::Point(_));
+        let mut skipped = false;
         loop {
             self.counts.steps += 1;
             let c = cells.get(cell as usize)?;
@@ -359,15 +364,17 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
             let apex = c.corners.iter().fold(ids[0] ^ ids[1] ^ ids[2], |x, p| x ^ p);
             let dropped = face.step(frame.project(points[apex as usize]));
             let left_behind = std::mem::replace(&mut ids[dropped], apex);
-            if !matches!(self.values, Values::Point(_)) {
+            let skips = self.segments.skips(cell);
+            if !skips && (own || skipped) {
                 front = self.value(cell, &ids_before(ids, dropped, left_behind), &weights);
             }
             weights = face.weights();
             let (entered, left) = (t, face.t(&weights));
-            let back = self.value(cell, &ids, &weights);
+            let back = if skips { front } else { self.value(cell, &ids, &weights) };
+            skipped = skips;
             if left > reached {
                 let (from, to) = (entered.max(reached), left.min(t_max));
-                if from < to {
+                if from < to && !skips {
                     let at = |x: f64| {
                         if x == entered {
                             front

@@ -4,7 +4,9 @@ use crate::output::misuse;
 use crate::variant::{named, table};
 use anyhow::{Result, anyhow, bail};
 use clap::Args;
-use halite::integral::choice::{Alpha, Build, Choice, Form, Planes, Texels};
+use halite::integral::choice::{
+    Alpha, Build, Choice, Culling, Form, MOST_PIECES, Method, Planes, Texels, Two, Weights,
+};
 use halite::integral::table::Kind;
 use halite::scene::{Scene, read};
 use serde_json::Value;
@@ -13,10 +15,11 @@ use std::path::Path;
 /// What of the integral's form somebody said.
 #[derive(Args)]
 pub(crate) struct Integral {
-    /// How a ray is integrated in a cell: auto, exact, or by a table: volume, polynomial or cylindrical;
-    /// of a grid's slabs between samples, second-order (of one length) or second-order-polynomial
-    #[arg(long, value_name = "FORM", value_parser = named::<Form>, help_heading = "Integral")]
-    integral: Option<Form>,
+    /// How a ray is integrated in a cell: auto, exact, or by a table: volume, polynomial or cylindrical; of a grid's slabs
+    /// between samples, second-order (of one length) or second-order-polynomial; with a second variable or light adaptive,
+    /// analytic, or segmented
+    #[arg(long, value_name = "FORM", value_parser = by_name, help_heading = "Integral")]
+    integral: Option<ByName>,
     /// Texels of the table: values in front, values behind, and lengths (volume) or planes (cylindrical)
     #[arg(long, value_name = "NxN[xN]", value_parser = table, help_heading = "Integral")]
     table: Option<[u32; 3]>,
@@ -42,16 +45,53 @@ pub(crate) struct Integral {
     /// What the table's texels are: float, unorm16 or unorm8
     #[arg(long, value_name = "FORMAT", value_parser = named::<Texels>, help_heading = "Integral")]
     texels: Option<Texels>,
+    /// Pieces of a segmented segment in a cell [default: 10]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_PIECES)),
+        help_heading = "Integral")]
+    pieces: Option<u32>,
+    /// Where the weights of a segmented piece's ends come from: closed (their closed form), or texture
+    #[arg(long, value_name = "FORM", value_parser = named::<Weights>, help_heading = "Integral")]
+    weights: Option<Weights>,
+    /// Which cells are left out as empty: by the hull of the values at their corners, by the corners alone, or none
+    #[arg(long, value_name = "KIND", value_parser = named::<Culling>, help_heading = "Integral")]
+    culling: Option<Culling>,
     /// Where tables are built: auto (on the device, unless it is software), host or device
     #[arg(long, value_name = "WHERE", value_parser = named::<Build>, help_heading = "Integral")]
     build: Option<Build>,
 }
 
+/// What "integral" names.
+#[derive(Clone, Copy)]
+enum ByName {
+    Form(Form),
+    Method(Method),
+}
+
+fn by_name(name: &str) -> Result<ByName, String> {
+    let form = Form::ALL.into_iter().find(|f| f.0 == name).map(|f| ByName::Form(f.1));
+    let method = || Method::ALL.into_iter().find(|m| m.0 == name).map(|m| ByName::Method(m.1));
+    form.or_else(method).ok_or_else(|| {
+        let known: Vec<&str> = Form::ALL.iter().map(|f| f.0).chain(Method::ALL.iter().map(|m| m.0)).collect();
+        format!("\"{name}\" is not known here; there is {}", known.join(", "))
+    })
+}
+
+impl ByName {
+    /// `choice` with this in it.
+    fn of(self, choice: Choice) -> Choice {
+        match self {
+            ByName::Form(form) => Choice { form, ..choice },
+            ByName::Method(method) => Choice { two: Two { method, ..choice.two }, ..choice },
+        }
+    }
+}
+
 impl Integral {
     /// `choice`, with what was said in its place.
     pub(crate) fn apply(&self, choice: Choice) -> Choice {
+        let choice = self.integral.map_or(choice, |name| name.of(choice));
         Choice {
-            form: self.integral.unwrap_or(choice.form),
+            form: choice.form,
             table: self.table.or(choice.table),
             lengths: self.lengths.unwrap_or(choice.lengths),
             degree: self.degree.unwrap_or(choice.degree),
@@ -61,6 +101,12 @@ impl Integral {
             per_cell: self.plane_per_cell.unwrap_or(choice.per_cell),
             texels: self.texels.unwrap_or(choice.texels),
             build: self.build.unwrap_or(choice.build),
+            two: Two {
+                pieces: self.pieces.unwrap_or(choice.two.pieces),
+                weights: self.weights.unwrap_or(choice.two.weights),
+                culling: self.culling.unwrap_or(choice.two.culling),
+                ..choice.two
+            },
         }
     }
 
@@ -76,6 +122,9 @@ impl Integral {
             ("--plane-per-cell", self.plane_per_cell.is_some()),
             ("--texels", self.texels.is_some()),
             ("--build", self.build.is_some()),
+            ("--pieces", self.pieces.is_some()),
+            ("--weights", self.weights.is_some()),
+            ("--culling", self.culling.is_some()),
         ];
         all.into_iter().filter_map(|(name, given)| given.then_some(name)).collect()
     }
@@ -93,13 +142,16 @@ impl Integral {
 pub(crate) fn of_scene(scene: &Scene, path: &Path) -> Result<Choice> {
     match &scene.integral {
         None => Ok(Choice::default()),
-        Some(Value::String(name)) => match Form::ALL.into_iter().find(|f| f.0 == name.as_str()) {
-            Some((_, form)) => Ok(Choice::of(form)),
-            None => {
-                let known = Form::ALL.map(|f| f.0).join(", ");
-                bail!("{}: integral: \"{name}\" is not known here; there is {known}", path.display())
-            }
+        Some(Value::String(name)) => match by_name(name) {
+            Ok(named) => Ok(named.of(Choice::default())),
+            Err(what) => bail!("{}: integral: {what}", path.display()),
         },
-        Some(value) => read(value).map_err(|what| anyhow!("{}: integral: {what}", path.display())),
+        Some(value) => {
+            let choice: Choice = read(value).map_err(|what| anyhow!("{}: integral: {what}", path.display()))?;
+            if !(1..=MOST_PIECES).contains(&choice.two.pieces) {
+                bail!("{}: integral: two: pieces: there are 1 to {MOST_PIECES}", path.display());
+            }
+            Ok(choice)
+        }
     }
 }

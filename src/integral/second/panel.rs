@@ -4,11 +4,12 @@
 //! polynomial through τ at all, one panel is a step of the implicit Runge–Kutta method of order 8 (Butcher, Implicit
 //! Runge–Kutta Processes, 1964), which for this system takes no iteration.
 
-use super::light::{ANGLES, angle, cone_sides, power};
-use super::{Bounded, Gathered, Ready, Scratch, Second, Segment, Table, closed};
-use crate::transfer::shading::Origin;
+use super::lanes::{Lanes, each, exp, opacity};
+use super::light::{ANGLES, angle, cone_sides};
+use super::nodes::{Nodes, Piece};
+use super::{Bounded, Gathered, Ready, Scratch, Second, Segment, Table};
+use crate::transfer::shading::{Origin, Shading};
 use crate::transfer::{Convention, bivariate::Shape, interpolate, interpolate_all};
-use glam::DVec3;
 
 /// Nodes of a panel.
 const NODES: usize = 4;
@@ -31,16 +32,18 @@ const DARK: f64 = 1e-12;
 /// Places of a segment that are one.
 const SAME: f64 = 1e-12;
 
-/// Gauss's rule of `N` nodes on [0, 1], and the integrals of the polynomials through its nodes from 0 to each of them.
+/// Gauss's rule on [0, 1], and the integrals of the polynomials through its nodes from 0 to each of them.
 #[derive(Debug, Clone)]
-struct Rule<const N: usize> {
-    nodes: [f64; N],
-    weights: [f64; N],
-    to_node: [[f64; N]; N],
+struct Rule {
+    nodes: Lanes,
+    weights: Lanes,
+    /// Of each polynomial, to each node.
+    to_node: [Lanes; NODES],
 }
 
-impl<const N: usize> Rule<N> {
-    fn new(nodes: [f64; N], weights: [f64; N]) -> Self {
+impl Rule {
+    /// Of `N` nodes; where they are fewer than lanes, the last stands in the others without weight.
+    fn new<const N: usize>(nodes: [f64; N], weights: [f64; N]) -> Self {
         let polynomial = |j: usize, x: f64| -> f64 {
             let factor = |k: usize| (x - nodes[k]) / (nodes[j] - nodes[k]);
             (0..N).filter(|&k| k != j).map(factor).product()
@@ -49,39 +52,46 @@ impl<const N: usize> Rule<N> {
         let integral = |i: usize, j: usize| -> f64 {
             (0..N).map(|k| nodes[i] * weights[k] * polynomial(j, nodes[i] * nodes[k])).sum()
         };
-        let to_node = std::array::from_fn(|i| std::array::from_fn(|j| integral(i, j)));
-        Rule { nodes, weights, to_node }
+        let to_node = |j: usize| each(|i| if j < N { integral(i.min(N - 1), j) } else { 0.0 });
+        Rule {
+            nodes: each(|i| nodes[i.min(N - 1)]),
+            weights: each(|i| if i < N { weights[i] } else { 0.0 }),
+            to_node: std::array::from_fn(to_node),
+        }
+    }
+
+    /// The places of a panel of length `h` at `u`.
+    #[inline(always)]
+    fn places(&self, u: f64, h: f64) -> Lanes {
+        each(|i| u + h * self.nodes[i])
     }
 
     /// Adds a panel of length `h`, of `depth`, with such nodes.
     #[inline(always)]
-    fn add(&self, nodes: &[Node; N], h: f64, depth: f64, direct: bool, light: &mut Gathered<f64>) {
-        let (mut emitted, mut absorbed) = ([0.0; 3], 0.0);
-        for i in 0..N {
-            let before: f64 = (0..N).map(|j| self.to_node[i][j] * nodes[j].density[3]).sum::<f64>() * h;
-            let seen = (-before).exp() * self.weights[i] * h;
-            for (sum, q) in emitted.iter_mut().zip(nodes[i].density) {
-                *sum += seen * q;
-            }
-            absorbed += seen * nodes[i].density[3];
-        }
-        let opacity = -(-depth).exp_m1();
+    fn add(&self, nodes: &Nodes, h: f64, depth: f64, direct: bool, light: &mut Gathered<f64>) {
+        let before = each(|i| (0..NODES).map(|j| self.to_node[j][i] * nodes.depth[j]).sum::<f64>() * -h);
+        let seen = exp(before);
+        let seen = each(|i| seen[i] * self.weights[i] * h);
+        let sum = |of: &Lanes| (0..NODES).map(|i| seen[i] * of[i]).sum::<f64>();
+        let (emitted, opacity) = (nodes.color.each_ref().map(sum), opacity(depth));
         // What one colour emits is that times the opacity, whatever the nodes miss of it.
-        let right = if !direct && absorbed > 0.0 { opacity / absorbed } else { 1.0 };
+        let absorbed = if direct { 0.0 } else { sum(&nodes.depth) };
+        let right = if absorbed > 0.0 { opacity / absorbed } else { 1.0 };
         light.add(emitted.map(|c| c * right), opacity);
     }
 
     /// The depth of a panel of length `h`.
-    fn depth(&self, nodes: &[Node; N], h: f64) -> f64 {
-        (0..N).map(|i| self.weights[i] * nodes[i].density[3]).sum::<f64>() * h
+    #[inline(always)]
+    fn depth(&self, nodes: &Nodes, h: f64) -> f64 {
+        (0..NODES).map(|i| self.weights[i] * nodes.depth[i]).sum::<f64>() * h
     }
 }
 
 /// The rules of three and of four nodes.
 #[derive(Debug, Clone)]
 pub(super) struct Rules {
-    three: Rule<3>,
-    four: Rule<NODES>,
+    three: Rule,
+    four: Rule,
 }
 
 impl Default for Rules {
@@ -95,23 +105,24 @@ impl Default for Rules {
     }
 }
 
-/// A piece of a segment in which nothing jumps or turns, and what is linear in it, at its ends.
-struct Piece<'a> {
-    ends: [f64; 2],
-    /// Red, green, blue and opacity of the functions of s.
-    knots: [[f64; 4]; 2],
-    factor: [f64; 2],
-    active: &'a [usize],
-    /// Nothing is absorbed in it.
-    clear: bool,
+impl Bounded {
+    /// Panels per unit of u that its bends ask for.
+    fn rate(&self, segment: &Segment) -> f64 {
+        match (&self.widget.shape, &self.wave) {
+            (Shape::Gaussian { sigma, .. }, _) => {
+                let [x, y] = [0, 1].map(|k| segment.rise[k] / sigma[k]);
+                (x * x + y * y).sqrt() / STEP[0]
+            }
+            (_, Some((wave, profile))) => (wave.rise(segment.rise) * profile.turn.radians()).abs() / STEP[1],
+            _ => 0.0,
+        }
+    }
 }
 
-/// What a node emits and absorbs over the whole segment: red, green, blue and depth.
-#[derive(Clone, Copy, Default)]
-struct Node {
-    density: [f64; 4],
-    /// What is left of 1 by the greatest opacity, where its logarithm counts.
-    left: f64,
+/// The cosines of the angles by which normals may turn in a panel, and in an easy one.
+pub(super) fn cosines(shading: Option<&Shading>) -> [f64; 2] {
+    let most = shading.and_then(Shading::shade).map_or(ANGLES[0], angle);
+    [1.0, EASY].map(|share| (most * share).cos())
 }
 
 /// Where beyond `u` a linear function, `at` where it is 0 and with such a `rise`, has `value`.
@@ -143,12 +154,6 @@ fn next_texel(table: &Table, segment: &Segment, u: f64) -> f64 {
     next(0).min(next(1))
 }
 
-/// What a table has at (s, g); not inlined, as [`next_texel`].
-#[inline(never)]
-fn texel(table: &Table, at: [f64; 2]) -> [f64; 4] {
-    table.at(at)
-}
-
 /// Where beyond `u` it next passes a knot.
 fn pass_knot<T>(knots: &[(f64, T)], at: f64, rise: f64, u: f64) -> f64 {
     let now = at + rise * (u + SAME);
@@ -164,6 +169,7 @@ fn pass_knot<T>(knots: &[(f64, T)], at: f64, rise: f64, u: f64) -> f64 {
 
 impl Second {
     /// Adds the part of `segment` between `ends`, where the widgets of `scratch.active` are.
+    #[inline(always)]
     pub(super) fn smooth(&self, segment: &Segment, ends: [f64; 2], scratch: &mut Scratch, light: &mut Gathered<f64>) {
         let mut u = ends[0];
         while u < ends[1] && light.through > DARK {
@@ -182,11 +188,10 @@ impl Second {
         let mut next = pass_knot(&self.factor, at[1], rise[1], u);
         match &self.source {
             Ready::Widgets(widgets) => {
-                for Bounded { widget, turns, .. } in active.iter().map(|&i| &widgets[i]) {
-                    let Some((wave, _)) = closed::wave(&widget.shape) else { continue };
+                for (wave, profile) in active.iter().filter_map(|&i| widgets[i].wave.as_ref()) {
                     let (p, d) = (wave.phase(at), wave.rise(rise));
                     let far = [f64::NEG_INFINITY, f64::INFINITY];
-                    next = turns.iter().fold(next, |next, turn| next.min(pass_whole(p - turn, d, far, u)));
+                    next = profile.turns().iter().fold(next, |next, turn| next.min(pass_whole(p - turn, d, far, u)));
                 }
             }
             Ready::Table(table) => {
@@ -226,25 +231,20 @@ impl Second {
         let inside = [0.25, 0.75].map(|x| segment.values(ends[0] + (ends[1] - ends[0]) * x));
         let outward = |[p, q]: [f64; 2]| [p - (q - p) * 0.5, q + (q - p) * 0.5].map(|x| x.max(0.0));
         let mut knots = [[0.0; 4]; 2];
-        if let Ready::Scalar { color, opacity, clamp } = &self.source {
-            let all = inside.map(|[s, _]| {
-                let [r, g, b] = interpolate_all(color, s, *clamp, |c| *c);
-                [r, g, b, interpolate(opacity, s, *clamp, |a| *a)]
-            });
+        if matches!(self.source, Ready::Scalar { .. }) {
+            let all = inside.map(|[s, _]| self.scalar(s));
             for k in 0..4 {
                 [knots[0][k], knots[1][k]] = outward([all[0][k], all[1][k]]);
             }
         }
-        let factor = if self.factor.is_empty() {
-            [1.0; 2]
-        } else {
-            outward(inside.map(|[_, g]| interpolate(&self.factor, g, true, |h| *h)))
-        };
+        let factor =
+            if self.factor.is_empty() { [1.0; 2] } else { outward(inside.map(|[_, g]| self.gradient_factor(g))) };
         let clear = matches!(self.source, Ready::Scalar { .. }) && knots[0][3] == 0.0 && knots[1][3] == 0.0;
         Piece { ends, knots, factor, active, clear: clear || factor == [0.0; 2] }
     }
 
     /// Adds panels until the piece is done, and counts them.
+    #[inline(always)]
     fn panels(&self, segment: &Segment, piece: &Piece, light: &mut Gathered<f64>) -> u64 {
         let [begin, end] = piece.ends;
         let bend = (end - begin) * self.rate(segment, piece);
@@ -271,7 +271,7 @@ impl Second {
                 continue;
             }
             let rule = &self.rules.four;
-            let nodes = rule.nodes.map(|x| self.node(segment, piece, u + h * x));
+            let nodes = self.nodes(segment, Some(piece), rule.places(u, h));
             let depth = rule.depth(&nodes, h);
             if depth > DEEPEST && h > THINNEST {
                 h *= (1.0 / depth).clamp(0.01, 0.6);
@@ -290,13 +290,14 @@ impl Second {
     }
 
     /// Adds all of a piece as one panel of three nodes, if little enough changes in it; else nothing, and says so.
+    #[inline(always)]
     fn add_easy(&self, segment: &Segment, piece: &Piece, light: &mut Gathered<f64>) -> bool {
         let ([begin, end], rule) = (piece.ends, &self.rules.three);
         let h = end - begin;
         if !self.is_evenly_lit(segment, begin, h, EASY) {
             return false;
         }
-        let nodes = rule.nodes.map(|x| self.node(segment, piece, begin + h * x));
+        let nodes = self.nodes(segment, Some(piece), rule.places(begin, h));
         let depth = rule.depth(&nodes, h);
         let is_easy = depth <= SHALLOW && self.is_tame(segment, &nodes, [begin, end], EASY);
         if is_easy {
@@ -306,30 +307,36 @@ impl Second {
     }
 
     /// Panels per unit of u that the bends of widgets ask for.
+    #[inline(always)]
     fn rate(&self, segment: &Segment, piece: &Piece) -> f64 {
         let Ready::Widgets(widgets) = &self.source else { return 0.0 };
-        let rate = |&i: &usize| match &widgets[i].widget.shape {
-            Shape::Gaussian { sigma, .. } => (segment.rise[0] / sigma[0]).hypot(segment.rise[1] / sigma[1]) / STEP[0],
-            shape => closed::wave(shape)
-                .map_or(0.0, |(wave, turn)| (wave.rise(segment.rise) * turn.radians()).abs() / STEP[1]),
-        };
-        piece.active.iter().map(rate).fold(0.0, f64::max)
+        piece.active.iter().map(|&i| widgets[i].rate(segment)).fold(0.0, f64::max)
+    }
+
+    /// Whether a widget bends so little between two places that one panel of three nodes may do.
+    pub(super) fn is_short(&self, bounded: &Bounded, segment: &Segment, ends: [f64; 2]) -> bool {
+        let length = ends[1] - ends[0];
+        // A wave that turns is more than one piece.
+        let turns = bounded.wave.as_ref().map_or(0.0, |(wave, _)| wave.rise(segment.rise).abs());
+        length * bounded.rate(segment).max(turns) < EASY
+            && length * self.depth_of_peak(&bounded.widget, segment) < SHALLOW
     }
 
     /// Whether what is no polynomial changes little enough between two places: by a `share` of what may change in a panel.
-    fn is_tame(&self, segment: &Segment, nodes: &[Node], [from, to]: [f64; 2], share: f64) -> bool {
+    #[inline(always)]
+    fn is_tame(&self, segment: &Segment, nodes: &Nodes, [from, to]: [f64; 2], share: f64) -> bool {
         let factor = 1.0 + (FACTOR - 1.0) * share;
         if self.convention == Convention::Opacity {
-            let [least, most] = nodes.iter().fold([f64::MAX, 0.0], |[l, m], n| [n.left.min(l), n.left.max(m)]);
+            let [least, most] = nodes.left.iter().fold([f64::MAX, 0.0], |[l, m], n| [n.min(l), n.max(m)]);
             if most > factor * least {
                 return false;
             }
         }
         let Some(shading) = &self.shading else { return true };
         let [a, b] = [from, to].map(|u| segment.vector + segment.turn * u);
-        let angle = shading.shade().map_or(ANGLES[0], angle) * share;
-        let product = a.length() * b.length();
-        if product > self.flat * self.flat && a.dot(b) < angle.cos() * product {
+        let cosine = self.cosines[usize::from(share < 1.0)];
+        let product = (a.length_squared() * b.length_squared()).sqrt();
+        if product > self.flat * self.flat && a.dot(b) < cosine * product {
             return false;
         }
         if shading.silhouette().is_some_and(|p| p.fract() != 0.0) {
@@ -344,53 +351,16 @@ impl Second {
         true
     }
 
-    /// What is at `u`.
-    fn node(&self, segment: &Segment, piece: &Piece, u: f64) -> Node {
-        let share = (u - piece.ends[0]) / (piece.ends[1] - piece.ends[0]);
-        let linear = |ends: [f64; 2]| ends[0] + (ends[1] - ends[0]) * share;
-        let absorbing = segment.length / self.unit;
-        let shining = self.direct.map(|e| e * segment.length);
-        let (mut emitted, mut white, mut depth, mut most) = (DVec3::ZERO, 0.0, 0.0, 0.0_f64);
-        let mut add = |color: DVec3, a: f64| {
-            let tau = self.extinction(a) * absorbing;
-            let q = shining.unwrap_or(tau);
-            emitted += color * q;
-            white += q;
-            depth += tau;
-            most = most.max(a);
-        };
-        match &self.source {
-            Ready::Widgets(widgets) => {
-                for Bounded { widget, .. } in piece.active.iter().map(|&i| &widgets[i]) {
-                    add(widget.color.into(), widget.height(segment.values(u)));
-                }
-            }
-            Ready::Table(table) => {
-                let [r, g, b, a] = texel(table, segment.values(u));
-                add(DVec3::new(r, g, b), a);
-            }
-            Ready::Scalar { .. } => {
-                let [r, g, b, a] = [0, 1, 2, 3].map(|k| linear([piece.knots[0][k], piece.knots[1][k]]));
-                add(DVec3::new(r, g, b), a);
-            }
-        }
-        let mut factor = linear(piece.factor);
-        if let Some(shading) = &self.shading {
-            let vector = segment.vector + segment.turn * u;
-            let length = vector.length();
-            let normal = (length > self.flat).then(|| vector / length);
-            if let (Some(p), Some(n)) = (shading.silhouette(), normal) {
-                factor *= power((1.0 - n.dot(segment.along).abs()).max(0.0), p);
-            }
-            if let Some(shade) = shading.shade() {
-                let place = segment.place + segment.along * (segment.length * u);
-                emitted = self.lit(shade, normal, place, segment.along, emitted, white);
-            }
-        }
-        if self.direct.is_none() {
-            emitted *= factor;
-        }
-        Node { density: [emitted.x, emitted.y, emitted.z, depth * factor], left: (1.0 - most).max(1e-9) }
+    /// Red, green, blue and opacity of the functions of s.
+    pub(super) fn scalar(&self, s: f64) -> [f64; 4] {
+        let Ready::Scalar { color, opacity, clamp } = &self.source else { return [0.0; 4] };
+        let [r, g, b] = interpolate_all(color, s, *clamp, |c| *c);
+        [r, g, b, interpolate(opacity, s, *clamp, |a| *a)]
+    }
+
+    /// h(g).
+    pub(super) fn gradient_factor(&self, g: f64) -> f64 {
+        interpolate(&self.factor, g, true, |h| *h)
     }
 }
 

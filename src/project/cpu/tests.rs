@@ -126,7 +126,7 @@ fn every_set_of_instructions_draws_the_same() {
         let transfer =
             TransferFunction::new(vec![(lo, [0.2; 3]), (hi, [1.0; 3])], (0..=points).map(knot).collect(), 1.0);
         let transfer = transfer.unwrap();
-        let mut draw = |engine: Engine, level: Option<Level>| {
+        let draw = |engine: Engine, level: Option<Level>| {
             let mut renderer = renderer(&mesh, engine);
             renderer.set_transfer(&transfer);
             if let (Some(level), Some(sweep)) = (level, renderer.backend().sweep()) {

@@ -4,6 +4,7 @@ use crate::cast::second::{self, Two, spreads};
 use crate::cast::{Frame, Gradients, Samples, Volume};
 use crate::error::{Error, Result};
 use crate::field::{Association, Field, Normal};
+use crate::integral::choice;
 use crate::integral::second::Second;
 use crate::transfer::TransferFunction;
 
@@ -36,6 +37,7 @@ impl Extra {
         samples: &Samples,
         field: &Field,
         transfer: &TransferFunction,
+        how: choice::Two,
     ) -> Result<()> {
         if let (None, Some(array)) = (&self.array, field.second()) {
             self.array = Some(Samples::new(volume, array)?);
@@ -46,7 +48,7 @@ impl Extra {
         }
         // Values are handed over in their own units.
         let own = Normal { mid: 0.0, half: 1.0 };
-        self.function.get_or_insert_with(|| Second::new(transfer, [own; 2], volume.centre(), volume.scale));
+        self.function.get_or_insert_with(|| Second::new(transfer, [own; 2], volume.centre(), volume.scale, how));
         Ok(())
     }
 

@@ -12,6 +12,11 @@ pub(super) trait Segments<const N: usize> {
     type Value: Real;
     /// A ray begins, from `origin` along a direction of length 1, in normalised coordinates.
     fn begin(&mut self, origin: DVec3, along: DVec3);
+    /// Whether nothing of a cell is seen: its segments are not taken.
+    #[inline(always)]
+    fn skips(&self, _cell: u32) -> bool {
+        false
+    }
     /// Takes a segment with these values at its ends, between two places on the ray.
     fn add(&mut self, front: &[Self::Value; N], back: &[Self::Value; N], t: [f64; 2], light: &mut Light<f32>);
     /// All of the ray is to be in `light`.
@@ -69,14 +74,16 @@ impl<const N: usize> Segments<N> for One<'_> {
 /// Segments of two variables: s and g; or with the gradient, of five.
 pub(super) struct Two<'a> {
     second: &'a Second,
+    /// A bit for each cell that may be seen; without, all may.
+    seen: Option<&'a [u64]>,
     scratch: Scratch,
     origin: DVec3,
     along: DVec3,
 }
 
 impl<'a> Two<'a> {
-    pub(super) fn new(second: &'a Second) -> Self {
-        Two { second, scratch: Scratch::default(), origin: DVec3::ZERO, along: DVec3::Z }
+    pub(super) fn new(second: &'a Second, seen: Option<&'a [u64]>) -> Self {
+        Two { second, seen, scratch: Scratch::default(), origin: DVec3::ZERO, along: DVec3::Z }
     }
 }
 
@@ -84,10 +91,17 @@ impl<const N: usize> Segments<N> for Two<'_> {
     // The logarithm of the opacity convention tells values apart that are closer than f32 does.
     type Value = f64;
 
+    #[inline(always)]
+    fn skips(&self, cell: u32) -> bool {
+        self.seen.is_some_and(|seen| seen[cell as usize / 64] >> (cell % 64) & 1 == 0)
+    }
+
+    #[inline(always)]
     fn begin(&mut self, origin: DVec3, along: DVec3) {
         (self.origin, self.along) = (origin, along);
     }
 
+    #[inline(always)]
     fn add(&mut self, front: &[f64; N], back: &[f64; N], [from, to]: [f64; 2], light: &mut Light<f32>) {
         if front.iter().chain(back).all(|v| v.is_finite()) {
             let [values, ends] = [front, back].map(|v| self.second.own([v[0], v[1]]));
