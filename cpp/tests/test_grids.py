@@ -4,7 +4,7 @@ import numpy as np
 from vtkmodules import vtkCommonCore, vtkCommonDataModel, vtkRenderingVolumeOpenGL2
 from vtkmodules.util import numpy_support
 
-from scene import Errors, add, check, look, main, pixels, renderer, scene, transform, truth, volume, window
+from scene import Errors, add, check, look, main, messages, pixels, renderer, scene, transform, truth, volume, window
 
 SIZE = (4, 3, 5)
 # Pixels, and parts of a ray that count as one value.
@@ -63,6 +63,18 @@ def nearest(axes, values=VALUES):
 def in_cells(axes, values):
     at = lambda axis, x: np.clip(np.searchsorted(axis, x, side="right") - 1, 0, len(axis) - 2)
     return lambda p: values[at(axes[2], p[..., 2]), at(axes[1], p[..., 1]), at(axes[0], p[..., 0])]
+
+
+def cropped(field, planes, flags, own=lambda p: p):
+    """The field in some regions, and elsewhere what is not seen."""
+    low, high = np.array(planes[::2]), np.array(planes[1::2])
+
+    def at(p):
+        q = own(p)
+        bit = ((q > low).astype(int) + (q > high)) @ [1, 3, 9]
+        return np.where(np.right_shift(flags, bit) & 1, field(p), 0.0)
+
+    return at
 
 
 def expect(v, axes, field, linear=True, near=1.5, **settings):
@@ -127,8 +139,62 @@ def test_directions():
     expect(volume(g, LOW, RAMP, 0.5), axes, trilinear(axes), matrix=matrix)
 
 
-def test_structured_grids():
-    # A sheared box with a linear field: the same whatever the split.
+def test_cropping_regions():
+    """The five kinds that VTK has names for, and any other, on images and rectilinear grids."""
+    kinds = {
+        "SubVolume": 0x2000,
+        "Fence": 0x2EBFEBA,
+        "InvertedFence": 0x5140145,
+        "Cross": 0x417410,
+        "InvertedCross": 0x7BE8BEF,
+    }
+    near = axes_of((0.3, 0.5, 0.25))
+    for i, (kind, flags) in enumerate(kinds.items()):
+        grid, axes = (image(), near) if i % 2 else (rectilinear(), AXES)
+        planes = [a[0] + (a[-1] - a[0]) * share for a in axes for share in (0.27, 0.71)]
+        v = volume(grid, LOW, RAMP, 0.5)
+        mapper = v.GetMapper()
+        mapper.CroppingOn()
+        mapper.SetCroppingRegionPlanes(*planes)
+        getattr(mapper, f"SetCroppingRegionFlagsTo{kind}")()
+        assert mapper.GetCroppingRegionFlags() == flags
+        expect(v, axes, cropped(trilinear(axes), planes, flags), steps=3000)
+        mapper.SetCroppingRegionFlags(0x1B6CA53)
+        expect(v, axes, cropped(trilinear(axes), planes, 0x1B6CA53), steps=3000)
+        mapper.CroppingOff()
+        expect(v, axes, trilinear(axes))
+
+
+def test_cropping_of_maxima_placed_volumes_and_meshes():
+    planes = [a[0] + (a[-1] - a[0]) * share for a in AXES for share in (0.3, 0.6)]
+
+    def crop(mapper, planes):
+        mapper.CroppingOn()
+        mapper.SetCroppingRegionPlanes(*planes)
+        mapper.SetCroppingRegionFlagsToFence()
+
+    v = volume(rectilinear(), LOW, RAMP, 0.5)
+    crop(v.GetMapper(), planes)
+    v.GetMapper().SetBlendModeToMaximumIntensity()
+    expect(v, AXES, cropped(trilinear(AXES), planes, 0x2EBFEBA), maximum=True, steps=6000)
+    # Planes move with the volume.
+    m = np.array([[0.8, -0.5, 0, 0.3], [0.5, 0.8, 0.1, -0.2], [0, 0.2, -1.1, 1.0], [0, 0, 0, 1]])
+    v = volume(rectilinear(), LOW, RAMP, 0.5)
+    crop(v.GetMapper(), planes)
+    v.SetUserMatrix(transform(m))
+    expect(v, AXES, cropped(trilinear(AXES), planes, 0x2EBFEBA), matrix=m, steps=3000)
+    # A mesh of cells, whose planes are in its points' coordinates.
+    g, shear, linear = sheared()
+    planes = [0.4, 0.9, 0.3, 0.8, 0.2, 0.7]
+    v = volume(g, LOW, RAMP, 0.5)
+    crop(v.GetMapper(), planes)
+    w, r = scene(v, size=WINDOW, position=(2.4, -2.1, 3.0))
+    field = cropped(linear, planes, 0x2EBFEBA, own=lambda p: p @ shear[:3, :3].T)
+    check(pixels(w), truth(r, WINDOW, field=field, opacity=LOW, color=RAMP, unit=0.5, matrix=shear, steps=3000))
+
+
+def sheared():
+    """A sheared box of hexahedra with a linear field, which is the same whatever the split."""
     g = vtkCommonDataModel.vtkStructuredGrid()
     g.SetDimensions(*SIZE)
     z, y, x = np.meshgrid(*(np.linspace(0, 1, n) for n in SIZE[::-1]), indexing="ij")
@@ -138,8 +204,71 @@ def test_structured_grids():
     p.SetData(numpy_support.numpy_to_vtk(points @ shear[:3, :3].T, deep=1))
     g.SetPoints(p)
     add(g, points @ [0.5, 0.2, 0.3])
+    return g, shear, lambda p: p @ [0.5, 0.2, 0.3]
+
+
+def test_light_and_second_variables_of_grids():
+    """A linear field has the same gradient in a grid and in a mesh of its cells, whatever finds it."""
+    linear = lambda p: 0.1 + p @ [0.4, 0.1, 0.25]
+    axes = axes_of((0.3, 0.5, 0.25))
+    z, y, x = np.meshgrid(*axes[::-1], indexing="ij")
+    points = np.stack([x, y, z], -1)
+    mesh = vtkCommonDataModel.vtkStructuredGrid()
+    mesh.SetDimensions(*SIZE)
+    p = vtkCommonCore.vtkPoints()
+    p.SetData(numpy_support.numpy_to_vtk(points.reshape(-1, 3), deep=1))
+    mesh.SetPoints(p)
+    add(mesh, linear(points).ravel())
+    pictures = []
+    for g in (image(linear(points)), mesh):
+        v = volume(g, LOW, RAMP, 0.5)
+        v.GetMapper().SetOpacityConventionToOpacity()
+        errors = Errors(v.GetMapper())
+        look_of = v.GetProperty()
+        look_of.SetInterpolationTypeToLinear()
+        look_of.ShadeOn()
+        look_of.SetAmbient(0.1)
+        look_of.SetDiffuse(0.6)
+        look_of.SetSpecular(0.4)
+        look_of.SetSpecularPower(7)
+        factor = vtkCommonDataModel.vtkPiecewiseFunction()
+        for at, h in ((0.0, 0.0), (0.3, 0.2), (0.7, 1.0)):
+            factor.AddPoint(at, h)
+        look_of.SetGradientOpacity(factor)
+        w, _ = scene(v, size=WINDOW, position=(2.4, -2.1, 3.0))
+        pictures.append(pixels(w))
+        assert len(errors) == 0
+    assert pictures[0].max() > 40
+    check(pictures[0], pictures[1])
+
+
+def test_reconstructions_by_tables():
+    """Parabolas with and without a table show about the same, and about the field."""
+    axes = axes_of((0.3, 0.5, 0.25))
+    v = volume(image(), LOW, RAMP, 0.5)
+    v.GetProperty().SetInterpolationTypeToLinear()
+    errors = messages(v.GetMapper())
+    w, _ = scene(v, size=WINDOW, position=(2.4, -2.1, 3.0))
+    exact, pictures = pixels(w), []
+    v.GetMapper().SetReconstruction("2")
+    for form, step in (("exact", 0), ("second-order-polynomial", 0), ("exact", 0.05), ("second-order", 0.05)):
+        v.GetMapper().SetIntegral(form)
+        v.GetMapper().SetSampleDistance(step)
+        pictures.append(pixels(w))
+    assert len(errors) == 0
+    assert np.abs(pictures[0] - exact).max() > 0
+    for plain, table in (pictures[:2], pictures[2:]):
+        check(table, plain, near=6)
+        check(plain, exact, near=8)
+    v.GetMapper().SetIntegral("volume")
+    pixels(w)
+    assert len(errors) == 1 and "second-order" in errors[0]
+
+
+def test_structured_grids():
+    g, shear, linear = sheared()
     w, r = scene(volume(g, LOW, RAMP, 0.5), size=WINDOW, position=(2.4, -2.1, 3.0))
-    check(pixels(w), truth(r, WINDOW, field=lambda p: p @ [0.5, 0.2, 0.3], opacity=LOW, color=RAMP, unit=0.5, matrix=shear))
+    check(pixels(w), truth(r, WINDOW, field=linear, opacity=LOW, color=RAMP, unit=0.5, matrix=shear))
 
 
 def test_hidden_cells():
