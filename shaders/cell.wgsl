@@ -219,22 +219,3 @@ fn depth_of(face: Face, weights: vec3f) -> vec2f {
 fn depth_between(a: vec2f, b: vec2f) -> f32 {
     return (b.x - a.x) + (b.y - a.y);
 }
-
-/// The faces of a tetrahedron for all rays of a picture: for each, how much nearer than the middle it is met, in a
-/// pixel from which places count, and how that rises from pixel to pixel to the right and down. In a perspective view
-/// "nearer by x" is the depth d / (1 + x), d being that of the middle: reciprocals of depths are linear on the screen
-/// (Kraus, Qiao & Ebert 2004, section 2.1).
-struct Facets {
-    at: vec4f,
-    right: vec4f,
-    down: vec4f,
-}
-
-/// Where the ray of the pixel `offset` away enters and leaves, within `limits`, as nearnesses; it misses if the first
-/// is not greater. Which faces are entered is the same for all rays that meet the tetrahedron.
-fn crossing(facets: Facets, entered: vec4<bool>, offset: vec2f, limits: vec2f) -> vec2f {
-    let nearness = fma(facets.down, vec4f(offset.y), fma(facets.right, vec4f(offset.x), facets.at));
-    let first = select(vec4f(limits.x), nearness, entered);
-    let last = select(nearness, vec4f(limits.y), entered);
-    return vec2f(min(min(first.x, first.y), min(first.z, first.w)), max(max(last.x, last.y), max(last.z, last.w)));
-}

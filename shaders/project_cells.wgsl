@@ -23,18 +23,14 @@ fn place(p: Point) -> vec3f {
     return (high_of(p) - frame.base.xyz) + (low_of(p) - frame.base_low.xyz);
 }
 
-/// From one point to another: as accurate as it is short.
-fn way(a: Point, b: Point) -> vec3f {
-    return (high_of(b) - high_of(a)) + (low_of(b) - low_of(a));
+fn twice_of(p: Point) -> Twice {
+    return Twice(high_of(p), low_of(p));
 }
 
-/// A tetrahedron: its corners, the first of them in the mesh's own coordinates, and the ways from it to the others.
+/// A tetrahedron: its corners relative to the frame's base, and in the mesh's own coordinates.
 struct Solid {
     p: array<vec3f, 4>,
-    a: Twice,
-    b: vec3f,
-    c: vec3f,
-    d: vec3f,
+    corners: array<Twice, 4>,
 }
 
 fn solid_of(cell: vec4u) -> Solid {
@@ -42,7 +38,10 @@ fn solid_of(cell: vec4u) -> Solid {
     let b = points(cell.y);
     let c = points(cell.z);
     let d = points(cell.w);
-    return Solid(array<vec3f, 4>(place(a), place(b), place(c), place(d)), Twice(high_of(a), low_of(a)), way(a, b), way(a, c), way(a, d));
+    return Solid(
+        array<vec3f, 4>(place(a), place(b), place(c), place(d)),
+        array<Twice, 4>(twice_of(a), twice_of(b), twice_of(c), twice_of(d)),
+    );
 }
 
 fn values_of(cell: u32, corners: vec4u) -> array<Value, 4> {
@@ -54,6 +53,17 @@ fn values_of(cell: u32, corners: vec4u) -> array<Value, 4> {
     let v = values(cell);
     return array<Value, 4>(v, v, v, v);
 }
+
+fn least_of(v: vec4f) -> f32 {
+    return min(min(v.x, v.y), min(v.z, v.w));
+}
+
+fn greatest_of(v: vec4f) -> f32 {
+    return max(max(v.x, v.y), max(v.z, v.w));
+}
+
+/// What a number of f32 is off by, of itself.
+const ROUNDING = 6e-8;
 
 /// The end of a bin below `s`, one further than needed: rounding.
 fn end_below(s: f32) -> i32 {
@@ -99,8 +109,10 @@ fn key_of(cell: u32) -> u32 {
     let x = vec4f(a.x, b.x, c.x, d.x);
     let y = vec4f(a.y, b.y, c.y, d.y);
     let w = vec4f(a.z, b.z, c.z, d.z);
-    // Beside the image, behind the eye, or cut off.
-    let edge = vec2f(1.0) + abs(frame.offset) + 4.0 / frame.size;
+    // Beside the image, behind the eye, or cut off. Of a picture that shows a millionth of the mesh f32 tells no places.
+    let away = max(max(dot(p[0], p[0]), dot(p[1], p[1])), max(dot(p[2], p[2]), dot(p[3], p[3])));
+    let slack = 4.0 * ROUNDING * sqrt(away) * max(length(frame.across[0].xyz), length(frame.across[1].xyz)) / least_of(max(w, vec4f(1e-6)));
+    let edge = vec2f(1.0 + slack) + abs(frame.offset) + 4.0 / frame.size;
     let z = vec4f(dot(p[0], frame.forward.xyz), dot(p[1], frame.forward.xyz), dot(p[2], frame.forward.xyz), dot(p[3], frame.forward.xyz));
     if all(x > edge.x * w) || all(x < -edge.x * w) || all(y > edge.y * w) || all(y < -edge.y * w)
         || all(w <= vec4f(0.0)) || all(z < vec4f(frame.near)) || all(z > vec4f(frame.far)) {
@@ -116,8 +128,9 @@ fn key_of(cell: u32) -> u32 {
         // Between the centres of pixels.
         let left = (x / w - frame.offset.x + 1.0) * (0.5 * frame.size.x);
         let down = (1.0 + frame.offset.y - y / w) * (0.5 * frame.size.y);
-        let low = ceil(vec2f(min(min(left.x, left.y), min(left.z, left.w)), min(min(down.x, down.y), min(down.z, down.w))) - 0.5 - 2.0 * GROWTH);
-        let high = floor(vec2f(max(max(left.x, left.y), max(left.z, left.w)), max(max(down.x, down.y), max(down.z, down.w))) - 0.5 + 2.0 * GROWTH);
+        let grown = 2.0 * GROWTH + slack * 0.5 * frame.size;
+        let low = ceil(vec2f(least_of(left), least_of(down)) - 0.5 - grown);
+        let high = floor(vec2f(greatest_of(left), greatest_of(down)) - 0.5 + grown);
         if any(low > high) {
             return HIDDEN;
         }

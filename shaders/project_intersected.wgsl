@@ -2,7 +2,8 @@
 
 // The words of a record:
 // 0–2  the cell's facets, counted from the middle of a pixel amid it;
-// 3    that middle, how far it is from the least value to the greatest, and which facets are entered;
+// 3    that middle, how far it is from the least value to the greatest, and bits: which facets are entered, and, of 16,
+//      whether the last is the reference that the others count from;
 // 4–5  the stretch of rays around it, times the cell's depth; and the longest edge;
 // then, where anything cuts rays off or is dithered, the nearnesses between which they are seen, the cell's depth (t in a
 // parallel view) and the rank; and the lines of the function.
@@ -37,14 +38,6 @@ fn box_of(corners: array<vec3f, 4>) -> array<vec2f, 4> {
     low = clamp(low - 1.0, vec2f(-1.0), frame.size);
     high = clamp(high + 1.0, vec2f(0.0), frame.size + 1.0);
     return array<vec2f, 4>(low, vec2f(high.x, low.y), high, vec2f(low.x, high.y));
-}
-
-fn least_of(v: vec4f) -> f32 {
-    return min(min(v.x, v.y), min(v.z, v.w));
-}
-
-fn greatest_of(v: vec4f) -> f32 {
-    return max(max(v.x, v.y), max(v.z, v.w));
 }
 
 /// The corners (x, y) around an outline, of which the fourth may be the first, moved outward so that all edges are
@@ -131,6 +124,9 @@ fn longer(a: vec2f, b: vec2f) -> vec2f {
 /// Depths that are as good as none.
 const AT_EYE = 1e-18;
 
+/// Cells that rays pass on less than this of their longest edge are flat: of others nothing cancels.
+const THIN = 0.25;
+
 /// Faces that are inclined less than this to the rays are taken for seen edge-on: where rays cross them f32 can't tell.
 const EDGE_ON = 1e-5;
 
@@ -147,29 +143,91 @@ fn way_to(start: Twice, way: Twice, t: f32, p: Twice) -> vec3f {
     return (t * high - q.high) + (t * low - (q.low + (p.low - start.low)));
 }
 
-fn write_record(i: u32, solid: Solid, v: array<Value, 4>, piece: u32, rank: u32) {
-    var p = solid.p;
+fn added(a: Twice, b: Twice) -> Twice {
+    let s = sum(a.high, b.high);
+    return sum(s.high, s.low + (a.low + b.low));
+}
+
+fn negated(a: Twice) -> Twice {
+    return Twice(-a.high, -a.low);
+}
+
+/// The products of components (Dekker 1971).
+fn multiplied(a: Twice, b: Twice) -> Twice {
+    let p = computed(a.high * b.high);
+    let a_high = shortened(a.high);
+    let b_high = shortened(b.high);
+    let a_low = a.high - a_high;
+    let b_low = b.high - b_high;
+    let rest = (((a_high * b_high - p) + a_high * b_low) + a_low * b_high) + a_low * b_low;
+    return Twice(p, rest + (a.high * b.low + a.low * b.high));
+}
+
+fn crossed(a: Twice, b: Twice) -> Twice {
+    let p = multiplied(Twice(a.high.yzx, a.low.yzx), Twice(b.high.zxy, b.low.zxy));
+    let q = multiplied(Twice(a.high.zxy, a.low.zxy), Twice(b.high.yzx, b.low.yzx));
+    return added(p, negated(q));
+}
+
+fn dotted(a: Twice, b: Twice) -> f32 {
+    let p = multiplied(a, b);
+    let whole = added(added(p, Twice(p.high.yzx, p.low.yzx)), Twice(p.high.zxy, p.low.zxy));
+    return whole.high.x;
+}
+
+/// The corners of a cell, or their values, but with corner `last` as the last, and turning the same way.
+fn corners_to(v: array<Twice, 4>, last: u32) -> array<Twice, 4> {
+    var to = v;
+    if last < 2u {
+        to = array<Twice, 4>(to[2], to[3], to[0], to[1]);
+    }
+    if (last & 1u) == 0u {
+        to = array<Twice, 4>(to[1], to[0], to[3], to[2]);
+    }
+    return to;
+}
+
+fn values_to(v: array<Value, 4>, last: u32) -> array<Value, 4> {
+    var to = v;
+    if last < 2u {
+        to = array<Value, 4>(to[2], to[3], to[0], to[1]);
+    }
+    if (last & 1u) == 0u {
+        to = array<Value, 4>(to[1], to[0], to[3], to[2]);
+    }
+    return to;
+}
+
+fn write_record(i: u32, solid: Solid, own_values: array<Value, 4>, piece: u32, rank: u32) {
+    let p = solid.p;
     var around: array<vec2f, 4>;
     let corners = array<vec3f, 4>(seen(p[0]), seen(p[1]), seen(p[2]), seen(p[3]));
     let w = vec4f(corners[0].z, corners[1].z, corners[2].z, corners[3].z);
-    let centroid = p[0] + (solid.b + solid.c + solid.d) * 0.25;
-    var centre: vec2f;
-    if any(w < vec4f(frame.nearest)) {
+    let is_special = any(w < vec4f(frame.nearest));
+    let centroid = (p[0] + p[1] + p[2] + p[3]) * 0.25;
+    var centre = pixel_of(seen(centroid));
+    if is_special {
         around = box_of(corners);
         centre = (around[0] + around[2]) * 0.5;
-    } else {
-        let o = outline(dependency(p));
-        let at = array<vec2f, 4>(pixel_of(corners[0]), pixel_of(corners[1]), pixel_of(corners[2]), pixel_of(corners[3]));
-        let x = vec4f(at[0].x, at[1].x, at[2].x, at[3].x);
-        let y = vec4f(at[0].y, at[1].y, at[2].y, at[3].y);
-        around = grown(vec4f(x[o.x], x[o.y], x[o.z], x[o.w]), vec4f(y[o.x], y[o.y], y[o.z], y[o.w]));
-        centre = pixel_of(seen(centroid));
     }
+    // The corner opposite to the face that is seen largest comes last: other faces count from that one.
+    let shown = abs(dependency(p));
+    let largest = greatest_of(shown);
+    let last = select(select(select(3u, 2u, shown.z == largest), 1u, shown.y == largest), 0u, shown.x == largest);
+    let at = corners_to(solid.corners, last);
+    let v = values_to(own_values, last);
+    let ab = added(at[1], negated(at[0]));
+    let ac = added(at[2], negated(at[0]));
+    let ad = added(at[3], negated(at[0]));
+    let bc = added(at[2], negated(at[1])).high;
+    let b = ab.high;
+    let c = ac.high;
+    let d = ad.high;
     centre = floor(clamp(centre, vec2f(0.0), frame.size - 1.0)) + 0.5;
     let pixel = centre - 0.5;
     let start = affine(frame.starts, pixel.x, pixel.y);
     let way = affine(frame.ways, pixel.x, pixel.y);
-    let longest = max(max(max(length(solid.b), length(solid.c)), max(length(solid.d), distance(solid.b, solid.c))), max(distance(solid.b, solid.d), distance(solid.c, solid.d)));
+    let longest = max(max(max(length(b), length(c)), max(length(d), length(bc))), max(distance(b, d), distance(c, d)));
     // Where the pixel's ray is as deep as the cell's middle, how far that is from one pixel to the next, and from the
     // eye.
     var t = dot(centroid, frame.forward.xyz);
@@ -183,34 +241,90 @@ fn write_record(i: u32, solid: Solid, v: array<Value, 4>, piece: u32, rank: u32)
     let right = fma(by_column(frame.ways), vec3f(t), by_column(frame.starts));
     let down = fma(by_row(frame.ways), vec3f(t), by_row(frame.starts));
     let out = way.high * depth;
-    let away = way_to(start, way, t, solid.a);
-    // Inward normals, but for the sign of the volume, of the faces opposite to each corner.
-    let n = array<vec3f, 4>(-cross(solid.c - solid.b, solid.d - solid.b), cross(solid.c, solid.d), cross(solid.d, solid.b), cross(solid.b, solid.c));
-    let volume = dot(solid.b, n[1]);
-    var heights = vec4f(dot(away - solid.b, n[0]), dot(away, n[1]), dot(away, n[2]), dot(away, n[3]));
-    var slopes = vec4f(dot(out, n[0]), dot(out, n[1]), dot(out, n[2]), dot(out, n[3]));
-    if PERSPECTIVE {
-        slopes -= heights;
+    let away = way_to(start, way, t, at[0]);
+    // Inward normals, but for the sign of the volume, of the faces opposite to each corner: of flat cells they are what
+    // rounding of edges leaves nothing of.
+    let normal_b = crossed(ac, ad);
+    let normal_c = crossed(ad, ab);
+    let normal_d = crossed(ab, ac);
+    let normal_a = negated(added(added(normal_b, normal_c), normal_d));
+    let volume = dotted(ab, normal_b);
+    let n = array<vec3f, 4>(normal_a.high, normal_b.high, normal_c.high, normal_d.high);
+    // From the eye to corners a and b; the same everywhere in a parallel view.
+    let seen_a = select(out, out - away, PERSPECTIVE);
+    let seen_b = select(out, seen_a + b, PERSPECTIVE);
+    let away_b = away - b;
+    let slopes = vec4f(dot(seen_b, n[0]), dot(seen_a, n[1]), dot(seen_a, n[2]), dot(seen_a, n[3]));
+    if !is_special {
+        // From the pixel to the corners, as accurate as the cell is small; from the areas of its faces the outline.
+        let ndc = select(vec2f(0.0), sample_of(centre), PERSPECTIVE);
+        let across_image = array<vec3f, 2>(frame.across[0].xyz - ndc.x * frame.forward.xyz, frame.across[1].xyz - ndc.y * frame.forward.xyz);
+        let corner = array<vec3f, 4>(-away, -away_b, c - away, d - away);
+        let x = vec4f(dot(corner[0], across_image[0]), dot(corner[1], across_image[0]), dot(corner[2], across_image[0]), dot(corner[3], across_image[0]));
+        let y = vec4f(dot(corner[0], across_image[1]), dot(corner[1], across_image[1]), dot(corner[2], across_image[1]), dot(corner[3], across_image[1]));
+        let deep = depth + vec4f(dot(corner[0], frame.forward.xyz), dot(corner[1], frame.forward.xyz), dot(corner[2], frame.forward.xyz), dot(corner[3], frame.forward.xyz));
+        let per = 0.5 / select(vec4f(1.0), deep, PERSPECTIVE);
+        let left = centre.x + x * per * frame.size.x;
+        let under = centre.y - y * per * frame.size.y;
+        let o = outline(slopes);
+        around = grown(vec4f(left[o.x], left[o.y], left[o.z], left[o.w]), vec4f(under[o.x], under[o.y], under[o.z], under[o.w]));
     }
+    var heights = vec4f(dot(away_b, n[0]), dot(away, n[1]), dot(away, n[2]), dot(away, n[3]));
     let across = vec4f(dot(right, n[0]), dot(right, n[1]), dot(right, n[2]), dot(right, n[3]));
     let along_rows = vec4f(dot(down, n[0]), dot(down, n[1]), dot(down, n[2]), dot(down, n[3]));
+    let low = min(min(v[0], v[1]), min(v[2], v[3]));
+    let high = max(max(v[0], v[1]), max(v[2], v[3]));
+    let rises = array<Value, 3>(v[1] - v[0], v[2] - v[0], v[3] - v[0]);
+    var middle = v[0] - select(Value(), low, COUNTED);
+    var to_right: Value;
+    var to_below: Value;
+    var towards_eye: Value;
+    // Nearnesses of a flat cell's faces differ by little, and their differences by their common edges do not cancel:
+    // n_j × n_d is an edge, times the volume.
+    let reference = vec3f(heights.w, across.w, along_rows.w) / slopes.w;
+    let thickness = volume / slopes.w;
+    let is_thin = abs(thickness) * select(1.0, depth, PERSPECTIVE) < THIN * longest;
+    let is_measured = is_thin && !is_special && abs(reference.x) < select(FAR, 0.5, PERSPECTIVE) && all(abs(reference.yz) < vec2f(FAR));
     let size = vec4f(length(n[0]), length(n[1]), length(n[2]), length(n[3])) * length(out);
-    let edge_on = abs(slopes) <= EDGE_ON * size;
-    heights = select(heights, heights + (ASIDE.x * across + ASIDE.y * along_rows), edge_on);
-    slopes = select(slopes, vec4f(FLAT), edge_on);
+    let edge_on = (abs(slopes) <= EDGE_ON * size) & vec4<bool>(vec3<bool>(true), !is_measured);
+    let entered = (select(slopes, vec4f(FLAT), edge_on) > vec4f(0.0)) == vec4<bool>(volume > 0.0);
+    var facets: array<vec4f, 3>;
+    if is_measured {
+        let turns = array<vec3f, 3>(cross(away, out), cross(right, seen_a), cross(down, seen_a));
+        let turns_b = array<vec3f, 3>(cross(away_b, out), cross(right, seen_b), cross(down, seen_b));
+        var rise: array<Value, 3>;
+        for (var k = 0u; k < 3u; k++) {
+            let of_c = dot(c, turns[k]);
+            let of_b = dot(b, turns[k]);
+            let edges = vec3f(dot(bc, turns_b[k]), -of_c, of_b);
+            facets[k] = vec4f(thickness * (edges / slopes.xyz), reference[k]);
+            rise[k] = (rises[1] * of_b - rises[0] * of_c) / slopes.w;
+        }
+        // On the reference, and from there: of that, what the division by depth makes of the first is taken off.
+        let first = rise[0] / select(1.0, 1.0 + reference.x, PERSPECTIVE);
+        let taken = select(Value(), first, PERSPECTIVE);
+        middle += first;
+        to_right = rise[1] - taken * reference.y;
+        to_below = rise[2] - taken * reference.z;
+        towards_eye = -(rises[0] * slopes.y + rises[1] * slopes.z + rises[2] * slopes.w) / volume - taken;
+    } else {
+        let own = array<Value, 3>(rises[0] / volume, rises[1] / volume, rises[2] / volume);
+        middle += own[0] * heights.y + own[1] * heights.z + own[2] * heights.w;
+        to_right = own[0] * across.y + own[1] * across.z + own[2] * across.w;
+        to_below = own[0] * along_rows.y + own[1] * along_rows.z + own[2] * along_rows.w;
+        towards_eye = -(own[0] * dot(out, n[1]) + own[1] * dot(out, n[2]) + own[2] * dot(out, n[3]));
+        facets = array<vec4f, 3>(heights / slopes, across / slopes, along_rows / slopes);
+    }
+    heights += ASIDE.x * across + ASIDE.y * along_rows;
     var words: array<vec4f, 6>;
-    words[0] = heights / slopes;
-    words[1] = across / slopes;
-    words[2] = along_rows / slopes;
-    let entered = (slopes > vec4f(0.0)) == vec4<bool>(volume > 0.0);
+    words[0] = select(facets[0], heights / FLAT, edge_on);
+    words[1] = select(facets[1], across / FLAT, edge_on);
+    words[2] = select(facets[2], along_rows / FLAT, edge_on);
     let bits = select(vec4u(0u), vec4u(1u, 2u, 4u, 8u), entered);
     if !(abs(volume) > FLAT) {
         around = array<vec2f, 4>(vec2f(-9.0), vec2f(-9.0), vec2f(-9.0), vec2f(-9.0));
     }
-    let rises = array<Value, 3>((v[1] - v[0]) / volume, (v[2] - v[0]) / volume, (v[3] - v[0]) / volume);
-    let low = min(min(v[0], v[1]), min(v[2], v[3]));
-    let high = max(max(v[0], v[1]), max(v[2], v[3]));
-    words[3] = vec4f(centre, last_of(high) - last_of(low), f32(bits.x | bits.y | bits.z | bits.w));
+    words[3] = vec4f(centre, last_of(high) - last_of(low), f32(bits.x | bits.y | bits.z | bits.w | select(0u, 16u, is_measured)));
     let stretch = stretch_around(way.high, depth);
     words[4] = vec4f(stretch[0], longest);
     words[5] = vec4f(stretch[1], 0.0);
@@ -219,18 +333,9 @@ fn write_record(i: u32, solid: Solid, v: array<Value, 4>, piece: u32, rank: u32)
         limits = depth / max(vec2f(frame.near, frame.far) + frame.forward.w, vec2f(AT_EYE)) - 1.0;
     }
     let rare = vec4f(limits, select(t, depth, PERSPECTIVE), f32(rank & 0xffffffu));
-    let middle = (v[0] - select(Value(), low, COUNTED)) + (rises[0] * dot(away, n[1]) + rises[1] * dot(away, n[2]) + rises[2] * dot(away, n[3]));
-    let towards_eye = -(rises[0] * dot(out, n[1]) + rises[1] * dot(out, n[2]) + rises[2] * dot(out, n[3]));
     // In a parallel view the eye is beyond all values.
     let eye = select(FAR * last_of(towards_eye), last_of(low) + last_of(middle + towards_eye), PERSPECTIVE);
-    store(i, words, rare, last_of(low), last_of(high), eye, piece, Values(
-        middle,
-        rises[0] * dot(right, n[1]) + rises[1] * dot(right, n[2]) + rises[2] * dot(right, n[3]),
-        rises[0] * dot(down, n[1]) + rises[1] * dot(down, n[2]) + rises[2] * dot(down, n[3]),
-        towards_eye,
-        low,
-        high,
-    ));
+    store(i, words, rare, last_of(low), last_of(high), eye, piece, Values(middle, to_right, to_below, towards_eye, low, high));
     records[i].vertices[0].corner = around[0];
     records[i].vertices[1].corner = around[1];
     records[i].vertices[2].corner = around[2];

@@ -1,5 +1,33 @@
 // Drawing by intersection: the words and values are those of project_intersected.wgsl.
 
+/// The faces of a tetrahedron for all rays of a picture: for each, how much nearer than the middle it is met, in a
+/// pixel from which places count, and how that rises from pixel to pixel to the right and down. In a perspective view
+/// "nearer by x" is the depth d / (1 + x), d being that of the middle: reciprocals of depths are linear on the screen
+/// (Kraus, Qiao & Ebert 2004, section 2.1). Where the last is the reference, the others count from that.
+struct Facets {
+    at: vec4f,
+    right: vec4f,
+    down: vec4f,
+}
+
+/// Where a ray enters and leaves, as nearnesses that count from `reference`; it misses if the first is not greater.
+struct Crossing {
+    near: vec2f,
+    reference: f32,
+}
+
+/// The crossing of the ray of the pixel `offset` away, within `limits`. Which faces are entered is the same for all rays
+/// that meet the tetrahedron.
+fn crossing(facets: Facets, is_reference: bool, entered: vec4<bool>, offset: vec2f, limits: vec2f) -> Crossing {
+    var nearness = fma(facets.down, vec4f(offset.y), fma(facets.right, vec4f(offset.x), facets.at));
+    let reference = select(0.0, nearness.w, is_reference);
+    nearness.w = select(nearness.w, 0.0, is_reference);
+    let first = select(vec4f(limits.x - reference), nearness, entered);
+    let last = select(nearness, vec4f(limits.y - reference), entered);
+    let near = vec2f(min(min(first.x, first.y), min(first.z, first.w)), max(max(last.x, last.y), max(last.z, last.w)));
+    return Crossing(near, reference);
+}
+
 /// How much nearer than the middle of a cell, at `depth` (t in a parallel view), the ray's points at `t` are.
 fn nearness_at(t: vec2f, stretch: f32, depth: f32) -> vec2f {
     let along = t / stretch;
@@ -22,14 +50,16 @@ fn fragment(drawn: Drawn) -> Fragment {
         let nearest = nearness_at(limits_of(at, origin_at(xy), direction / stretch, stretch), stretch, rare.z);
         limits = vec2f(min(limits.x, nearest.x), max(limits.y, nearest.y));
     }
-    let entered = (vec4u(u32(words[3].w)) & vec4u(1u, 2u, 4u, 8u)) != vec4u(0u);
-    let near = crossing(Facets(words[0], words[1], words[2]), entered, offset, limits);
+    let bits = u32(words[3].w);
+    let entered = (vec4u(bits) & vec4u(1u, 2u, 4u, 8u)) != vec4u(0u);
+    let met = crossing(Facets(words[0], words[1], words[2]), (bits & 16u) != 0u, entered, offset, limits);
+    let near = met.near;
     let is_met = near.x > near.y;
     if !is_met {
         discard;
     }
     // What nearnesses are divided by: see Facets.
-    let divisors = select(vec2f(1.0), 1.0 + near, PERSPECTIVE);
+    let divisors = select(vec2f(1.0), (1.0 + met.reference) + near, PERSPECTIVE);
     let share = divisors.yx * (1.0 / (divisors.x * divisors.y));
     let stretch = stretch_of(words[4].xyz, words[5].xyz, offset);
     // What misses is computed all the same, but in few steps.

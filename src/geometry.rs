@@ -19,9 +19,6 @@ use rayon::prelude::*;
 /// Meshes that are less thick than this, of what they are wide, are too flat for f32.
 const FLATTEST: f64 = 5e-5;
 
-/// A cell that is less thick than this, of its longest edge, is flat.
-const FLAT_CELL: f64 = 2e-3;
-
 /// One tetrahedron as engines see it: 32 bytes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, bytemuck::Pod, Zeroable)]
 #[repr(C)]
@@ -123,6 +120,7 @@ impl Geometry {
             .map(|&(t, k)| boundary::BoundaryFace { points: faces.outward(&corners, (t, k)), cell: t })
             .collect();
         self.boundary = Boundary::new(&self.points, boundary);
+        self.welded |= faces.weld.is_some();
         self.left_handed = left_handed(&faces.orientation, |i| i);
     }
 
@@ -173,15 +171,27 @@ impl Geometry {
     /// Whether the mesh is so flat, or so thin a needle, that f32 tells no lengths across it: the variance of its points
     /// along one of their principal axes is next to nothing beside that along another.
     pub fn is_flat(&self) -> bool {
+        let [least, greatest] = outer_eigenvalues(self.covariance());
+        !self.cells.is_empty() && least < FLATTEST * FLATTEST * greatest
+    }
+
+    /// Whether the mesh is so thin a needle that f32 tells no places across it: as [`Self::is_flat`], along two axes.
+    pub fn is_needle(&self) -> bool {
+        let covariance = self.covariance();
+        let [least, greatest] = outer_eigenvalues(covariance);
+        let middle = covariance.x_axis.x + covariance.y_axis.y + covariance.z_axis.z - least - greatest;
+        !self.cells.is_empty() && middle < FLATTEST * FLATTEST * greatest
+    }
+
+    /// How the points vary about their mean.
+    fn covariance(&self) -> DMat3 {
         let n = self.points.len().max(1) as f64;
         let mean = self.points.par_iter().copied().reduce(|| DVec3::ZERO, |a, b| a + b) / n;
         let product = |p: &DVec3| {
             let d = *p - mean;
             DMat3::from_cols(d * d.x, d * d.y, d * d.z)
         };
-        let covariance = self.points.par_iter().map(product).reduce(|| DMat3::ZERO, |a, b| a + b) * (1.0 / n);
-        let [least, greatest] = outer_eigenvalues(covariance);
-        !self.cells.is_empty() && least < FLATTEST * FLATTEST * greatest
+        self.points.par_iter().map(product).reduce(|| DMat3::ZERO, |a, b| a + b) * (1.0 / n)
     }
 
     /// The longest edge of a cell, in normalised units: no segment of a ray is longer.
@@ -192,21 +202,6 @@ impl Geometry {
             pairs.iter().map(|&(i, j)| p[i].distance_squared(p[j])).fold(0.0, f64::max)
         };
         self.cells.par_iter().map(edges).reduce(|| f64::MIN_POSITIVE, f64::max).sqrt()
-    }
-
-    /// The longest edge of the cells that are flat, in normalised units; 0 if none is. Lengths across such a cell are
-    /// differences of what is as long as it is wide.
-    pub fn longest_flat_edge(&self) -> f64 {
-        let edge = |c: &Cell| {
-            let p = c.corners.map(|i| self.points[i as usize]);
-            let [a, b, c] = [p[1] - p[0], p[2] - p[0], p[3] - p[0]];
-            let normals = [(c - a).cross(b - a), b.cross(c), c.cross(a), a.cross(b)];
-            let area = normals.iter().map(|n| n.length_squared()).fold(0.0, f64::max).sqrt();
-            let longest = [a, b, c, b - a, c - a, c - b].iter().map(|e| e.length_squared()).fold(0.0, f64::max).sqrt();
-            let volume = a.dot(b.cross(c)).abs();
-            if volume > 0.0 && volume < FLAT_CELL * longest * area { longest } else { 0.0 }
-        };
-        self.cells.par_iter().map(edge).reduce(|| 0.0, f64::max)
     }
 
     /// Bytes that it takes at most to make one of so many points and tetrahedra, with what [`Faces::new`] needs and leaves.

@@ -13,7 +13,6 @@ mod recover;
 mod second;
 mod stats;
 mod tables;
-mod thickness;
 
 use crate::cast::Reconstruction;
 pub use crate::engine::Engine;
@@ -164,8 +163,7 @@ impl Renderer {
         self.stats.engine = if walks { Backend::Walk.engine() } else { self.backend.engine() }.into();
         if left && self.backend.gpu().is_some() && self.stats.device != "cpu" {
             tracing::warn!(
-                "the mesh, or a cell of it where the function is dense, is too flat for the 32-bit floats of a device; \
-                 the CPU draws it, by the walk"
+                "the mesh is too flat or thin for the 32-bit floats of the device; the CPU draws it, by the walk"
             );
         }
         // Nobody who left the choice to Halite on a CPU asked for another engine.
@@ -354,6 +352,7 @@ impl Renderer {
             if stopped.load(Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let image = self.render_cropped(view, &tell)?;
+        self.stay.draw();
         if stopped.load(Relaxed) { Err(Error::Aborted) } else { Ok(image) }
     }
 
@@ -390,7 +389,6 @@ impl Renderer {
             return self.render_second(view, progress);
         }
         let start = Instant::now();
-        self.judge_thickness()?;
         self.connect_for_order()?;
         let walks = self.mesh.as_ref().is_some_and(|m| m.left_to_walk);
         let on_device =
@@ -479,7 +477,6 @@ impl Renderer {
         (self.stats.cpu_rays, self.stats.panels, self.stats.culled_cells) = (counts.unfinished, 0, 0);
         (self.stats.projection, self.stats.sweep) = (projection, sweep);
         self.stats.frame_ms = ms(start);
-        self.stay.draw();
         self.build_next(late)?;
         Ok(Image { size: view.size(), pixels })
     }

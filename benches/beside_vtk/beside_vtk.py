@@ -183,4 +183,5 @@ def main():
         pathlib.Path(options.json).write_text(json.dumps(figures, indent=1) + "\n")
 
 
-main()
+if __name__ == "__main__":
+    main()

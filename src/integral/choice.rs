@@ -18,7 +18,8 @@ pub struct Choice {
     pub table: Option<[u32; 3]>,
     /// Of polynomials, from 1 to 8: Guthe et al. (2002) have 1, 2 and 4. Those of slabs have 4 at most.
     pub degree: u32,
-    /// Steps in which slabs of second order are summed: El Hajjar et al. (2008) have 8 to 256, and find 64 enough.
+    /// Steps in which slabs of second order are summed, from 1 to [`MOST_ITERATIONS`]: El Hajjar et al. (2008) have 8 to 256,
+    /// and find 64 enough.
     pub iterations: u32,
     /// How polynomials' opacity depends on the length.
     pub alpha: Alpha,
@@ -114,6 +115,19 @@ pub struct Two {
 
 /// The most pieces of a segment.
 pub const MOST_PIECES: u32 = 10_000;
+
+impl Two {
+    /// Whether a segment can be integrated so.
+    ///
+    /// # Errors
+    /// [`Error::Render`] for no pieces, or more than [`MOST_PIECES`].
+    pub fn check(&self) -> Result<()> {
+        if (1..=MOST_PIECES).contains(&self.pieces) {
+            return Ok(());
+        }
+        Err(Error::Render(format!("a segment has 1 to {MOST_PIECES} pieces, and not {}", self.pieces)))
+    }
+}
 
 impl Default for Two {
     fn default() -> Self {
@@ -228,6 +242,9 @@ pub const FEW_KNOTS: f64 = 8.0;
 /// rounding is 1e-7 of it.
 const OPAQUE_TEXEL: f32 = 1e4;
 
+/// The most steps in which a slab is summed.
+pub const MOST_ITERATIONS: u32 = 65_536;
+
 /// Bytes of a table at most.
 const MOST_BYTES: u64 = 1 << 30;
 
@@ -325,7 +342,9 @@ impl Choice {
             Form::SecondOrderPolynomial if !(1..=4).contains(&self.degree) => {
                 Some(format!("polynomials of slabs have a degree from 1 to 4, and not {}", self.degree))
             }
-            Form::SecondOrder if self.iterations == 0 => Some("a slab is summed in 1 step at least".to_owned()),
+            Form::SecondOrder if !(1..=MOST_ITERATIONS).contains(&self.iterations) => {
+                Some(format!("a slab is summed in 1 to {MOST_ITERATIONS} steps, and not in {}", self.iterations))
+            }
             _ => None,
         };
         let bytes = Choice::bytes(size);
@@ -412,5 +431,13 @@ mod tests {
         refused(Form::SecondOrder, [512, 512, 512], 2, "bytes");
         refused(Form::SecondOrderPolynomial, [256, 256, 256], 2, "at most 128");
         refused(Form::SecondOrderPolynomial, [8, 8, 8], 5, "from 1 to 4");
+        for iterations in [0, MOST_ITERATIONS + 1] {
+            let choice = Choice { iterations, ..Choice::of(Form::SecondOrder) };
+            assert!(choice.check([8; 3]).unwrap_err().to_string().contains("65536 steps"));
+        }
+        for pieces in [0, MOST_PIECES + 1] {
+            assert!(Two { pieces, ..Two::default() }.check().unwrap_err().to_string().contains("1 to 10000 pieces"));
+        }
+        Two::default().check().unwrap();
     }
 }

@@ -10,7 +10,6 @@ use crate::integral::{Exact, Integral, Lookup};
 use crate::project::cpu::{self as sweep, Sweep};
 use crate::project::{self, Switches, gpu::Project};
 use crate::render::Engine;
-use crate::transfer::{Emission, TransferFunction};
 use crate::traverse::cpu;
 use crate::traverse::gpu::Traverse;
 use crate::view::Blend;
@@ -37,30 +36,16 @@ pub(super) struct Needs {
     pub(super) neighbours: bool,
     /// It reads neighbours if it is to draw in an order that needs them.
     pub(super) order: bool,
-    /// Its lengths are of 32 bits, which do not tell those across a flat mesh: see [`Geometry::is_flat`].
-    thickness: bool,
-    /// Its lengths across a flat cell are off by [`COARSE`] of the cell's longest edge.
-    cells: bool,
+    /// It draws meshes that are flat: see [`Geometry::is_flat`].
+    sheets: bool,
+    /// It draws meshes that are as thin in two directions: see [`Geometry::is_needle`].
+    needles: bool,
 }
-
-/// What lengths across flat cells are off by, of their longest edge, where only f32 tells them.
-const COARSE: f64 = 6e-7;
-
-/// How far off opacities may be.
-const FAINT: f64 = 1e-4;
 
 impl Needs {
     /// Whether the backend can draw the mesh.
     pub(super) fn are_met_by(self, geometry: &Geometry) -> bool {
-        !self.thickness || !geometry.is_flat()
-    }
-
-    /// Whether what the lengths across flat cells are off by shows under a function, `transfer`: it is that dense.
-    /// `edge`, the longest of such cells, and `scale` are as [`Geometry`] has them.
-    pub(super) fn misses(self, edge: impl FnOnce() -> f64, scale: f64, transfer: &TransferFunction) -> bool {
-        let opacity = transfer.opacity().iter().fold(0.0, |most, k| k.1.max(most));
-        let emitted = if let Emission::Direct { scale } = transfer.emission() { scale } else { 0.0 };
-        self.cells && edge() * COARSE * transfer.extinction(opacity).max(emitted) > FAINT * scale
+        (self.sheets || !geometry.is_flat()) && (self.needles || !geometry.is_needle())
     }
 }
 
@@ -163,10 +148,10 @@ impl Backend {
     pub(super) fn needs(&self) -> Needs {
         match self {
             Backend::Walk | Backend::Project(_) => {
-                Needs { neighbours: true, order: false, thickness: false, cells: false }
+                Needs { neighbours: true, order: false, sheets: true, needles: true }
             }
-            Backend::WalkOnDevice(_) => Needs { neighbours: true, order: false, thickness: true, cells: false },
-            Backend::ProjectOnDevice(_) => Needs { neighbours: false, order: true, thickness: true, cells: true },
+            Backend::WalkOnDevice(_) => Needs { neighbours: true, order: false, sheets: false, needles: false },
+            Backend::ProjectOnDevice(_) => Needs { neighbours: false, order: true, sheets: true, needles: false },
         }
     }
 

@@ -49,6 +49,9 @@ impl Renderer {
                     (0..4).for_each(|k| front[k] += through * behind[k]);
                 }
             });
+            if progress((i + 1) as f64 / count).is_break() {
+                break;
+            }
         }
         (self.stats.steps, self.stats.repaired_rays, self.stats.panels) = (steps, repaired, panels);
         Ok(image)

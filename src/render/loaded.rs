@@ -4,7 +4,6 @@ use super::backend::Needs;
 use crate::geometry::Geometry;
 use crate::mesh::cells::Tetrahedra;
 use crate::mesh::faces::Faces;
-use crate::transfer::TransferFunction;
 use glam::DVec3;
 
 /// The mesh that is drawn.
@@ -16,12 +15,8 @@ pub(super) struct Loaded {
     pub(super) cells: usize,
     /// Whether cells know their neighbours.
     pub(super) connected: bool,
-    /// Whether the whole of it is too flat for the backend.
-    pub(super) too_flat: bool,
-    /// Whether the backend leaves it to the walk on the CPU, for that or as the last function asks.
+    /// Whether the backend leaves it to the walk on the CPU, as it is too flat or thin.
     pub(super) left_to_walk: bool,
-    /// The longest edge of the cells that are flat, in normalised units, once somebody asked.
-    pub(super) flat: Option<f64>,
     /// The longest edge of a cell, in normalised units, once somebody asked.
     pub(super) longest: Option<f64>,
 }
@@ -49,32 +44,12 @@ impl Loaded {
             geometry = Geometry::new(&points, &tetrahedra, &faces);
         }
         drop(points);
-        let too_flat = !needs.are_met_by(&geometry);
-        let left_to_walk = too_flat;
-        Loaded {
-            tetrahedra,
-            geometry,
-            points: count,
-            cells,
-            connected,
-            too_flat,
-            left_to_walk,
-            flat: None,
-            longest: None,
-        }
+        let left_to_walk = !needs.are_met_by(&geometry);
+        Loaded { tetrahedra, geometry, points: count, cells, connected, left_to_walk, longest: None }
     }
 
     /// Points have moved.
     pub(super) fn judge_again(&mut self, needs: Needs) {
-        self.too_flat = !needs.are_met_by(&self.geometry);
-        (self.left_to_walk, self.flat, self.longest) = (self.too_flat, None, None);
-    }
-
-    /// Finds whether the backend leaves the mesh to the walk under `transfer`. True if that is otherwise than before.
-    pub(super) fn judge(&mut self, needs: Needs, transfer: &TransferFunction) -> bool {
-        let (flat, geometry) = (&mut self.flat, &self.geometry);
-        let edge = || *flat.get_or_insert_with(|| geometry.longest_flat_edge());
-        let left = self.too_flat || needs.misses(edge, geometry.scale, transfer);
-        std::mem::replace(&mut self.left_to_walk, left) != left
+        (self.left_to_walk, self.longest) = (!needs.are_met_by(&self.geometry), None);
     }
 }

@@ -60,15 +60,13 @@ impl Renderer {
     /// Draws a frame with a second variable, or light, by the walk on the CPU.
     pub(super) fn render_second(&mut self, view: &View, progress: &Progress) -> Result<Image> {
         let start = Instant::now();
-        let mesh = self.mesh.as_mut().ok_or_else(|| missing("mesh"))?;
-        if !mesh.connected {
-            self.pool.install(|| mesh.geometry.connect());
-            mesh.connected = true;
+        if self.mesh.as_ref().is_some_and(|m| !m.connected) {
+            self.connect_in_place()?;
         }
+        let mesh = self.mesh.as_ref().ok_or_else(|| missing("mesh"))?;
         let field = self.field.as_ref().ok_or_else(|| missing("field"))?.field();
         let transfer = self.transfer.as_ref().ok_or_else(|| missing("transfer function"))?;
         let (extra, two) = (&mut self.extra, self.integral.two);
-        let mesh = &*mesh;
         let drawn = self.pool.install(|| {
             let (values, second, seen) = extra.prepare(mesh, field, transfer, view.blend(), two)?;
             let culled = seen.map_or((0, 0.0), |s| (s.culled, s.ms));
@@ -138,6 +136,7 @@ impl Extra {
         two: Two,
     ) -> Result<(&TwoOrFive, &Second, Option<&Seen>)> {
         check(field, transfer, blend)?;
+        two.check()?;
         let lit = transfer.shading().is_some();
         let needs = lit || transfer.bivariate().is_some() && field.second().is_none();
         if needs && self.gradient.is_none() && field.association() == Association::Point {

@@ -80,6 +80,11 @@ impl Cropping {
 
     /// Boxes of the regions that are drawn, from front to back for `view`.
     fn boxes(&self, view: &View) -> Vec<[Range; 3]> {
+        // Nothing lies beyond a plane that is infinitely far.
+        let is_empty = |a: usize, [from, to]: Range| {
+            let plane = |side: usize| side.checked_sub(1).and_then(|k| self.planes[a].get(k));
+            plane(from) == Some(&f64::INFINITY) || plane(to) == Some(&f64::NEG_INFINITY)
+        };
         // The number of the region that the eye is in along each axis; beyond all where rays are parallel.
         let eye = view.eye().map(|eye| self.to_own.transform_point3(eye));
         let along = self.to_own.transform_vector3(view.forward());
@@ -99,6 +104,7 @@ impl Cropping {
                 }
             }
         }
+        boxes.retain(|of| (0..3).all(|a| !is_empty(a, of[a])));
         boxes
     }
 }
@@ -195,6 +201,20 @@ mod tests {
             }
         }
         assert!(shown > 10_000, "{shown}");
+    }
+
+    #[test]
+    fn nothing_lies_beyond_infinite_planes() {
+        let (low, high) = (f64::NEG_INFINITY, f64::INFINITY);
+        let whole = view(DVec3::Z * 3.0, Projection::Perspective { view_angle: 40.0 });
+        for (x, shown) in [([low, high], 0b010), ([low, low], 0b100), ([high, high], 0b001), ([low, 0.0], 0b110)] {
+            for region in 0..3 {
+                let planes = [x, [-1.0, 1.0], [-1.0, 1.0]];
+                let cropping = Cropping::new(planes, 1 << (region + 3 + 9), DMat4::IDENTITY).unwrap();
+                let parts = whole.clone().with_cropping(cropping).parts().unwrap();
+                assert_eq!(parts.len(), shown >> region & 1, "{x:?} {region}");
+            }
+        }
     }
 
     #[test]

@@ -197,8 +197,13 @@ fn set(renderer: &mut Renderer, job: &Job) -> halite::Result<()> {
 
 fn draw(variant: Variant, frames: u32, renderer: &mut Renderer, view: &View, truth: &Image) -> halite::Result<Row> {
     renderer.set_integral(variant.integral);
-    // Whatever the last variant left: each sorts for itself.
-    renderer.set_switches(Switches { order: Order::None, fragments: Fragments::Intersected, ..variant.switches });
+    // Whatever the last variant left: each sorts for itself, and finds the sequence of the mesh if it draws in such.
+    let other = match variant.switches.order {
+        Order::MpvoConvex => Order::Mpvonc,
+        Order::Mpvo | Order::Mpvonc | Order::Xmpvo => Order::MpvoConvex,
+        Order::Depth | Order::Circumsphere | Order::None => Order::None,
+    };
+    renderer.set_switches(Switches { order: other, fragments: Fragments::Intersected, ..variant.switches });
     if variant.switches.order != Order::None {
         renderer.render(view, &|_| ())?;
     }

@@ -53,24 +53,32 @@ fn mapped(v: f64, map: &Map) -> u32 {
 pub(super) type Pairs = [[[u64; LANES]; 4]; STEPS];
 
 /// Fetches the values at the corners of the voxels whose first corners have these indices; `rows` are how far the four rows
-/// of a voxel are behind that. What would be beyond the array is left as it is.
+/// of a voxel are behind that. What would be beyond the array, which a ray may leave a rounding before its end, gets the
+/// length 0.
 #[inline(never)]
-pub(super) fn fetch<T: Texel>(values: &[T], first: &[[u32; LANES]], rows: [usize; 4], map: &Map, pairs: &mut Pairs) {
+pub(super) fn fetch<T: Texel>(
+    values: &[T],
+    first: &[[u32; LANES]],
+    rows: [usize; 4],
+    map: &Map,
+    pairs: &mut Pairs,
+    lengths: &mut [[f32; LANES]; STEPS],
+) {
     // Rows of one length: so one comparison does for all four.
-    let Some(length) = values.len().checked_sub(rows[3]) else { return };
-    let row = |r: usize| values.get(rows[r]..).and_then(|row| row.get(..length));
-    let (Some(v0), Some(v1), Some(v2), Some(v3)) = (row(0), row(1), row(2), row(3)) else { return };
+    let length = values.len().saturating_sub(rows[3]);
+    let row = |r: usize| values.get(rows[r]..).and_then(|row| row.get(..length)).unwrap_or_default();
+    let (v0, v1, v2, v3) = (row(0), row(1), row(2), row(3));
     // All that is far in memory is asked for at once.
     let mut asked = 0;
     for first in first {
         for at in [first[0] as usize, first[LANES - 1] as usize] {
-            if at < length {
-                asked ^= v0[at].bits(map) ^ v1[at].bits(map) ^ v2[at].bits(map) ^ v3[at].bits(map);
+            if let (Some(a), Some(b), Some(c), Some(d)) = (v0.get(at), v1.get(at), v2.get(at), v3.get(at)) {
+                asked ^= a.bits(map) ^ b.bits(map) ^ c.bits(map) ^ d.bits(map);
             }
         }
     }
     std::hint::black_box(asked);
-    for (first, [p0, p1, p2, p3]) in first.iter().zip(pairs) {
+    for ((first, [p0, p1, p2, p3]), lengths) in first.iter().zip(pairs).zip(lengths) {
         for l in 0..LANES {
             let at = first[l] as usize;
             let ends = at..at + 2;
@@ -78,6 +86,8 @@ pub(super) fn fetch<T: Texel>(values: &[T], first: &[[u32; LANES]], rows: [usize
             if let (Some([a, i]), Some([b, j]), Some([c, k]), Some([d, m])) = (a, b, c, d) {
                 (p0[l], p1[l], p2[l], p3[l]) =
                     (pair(*a, *i, map), pair(*b, *j, map), pair(*c, *k, map), pair(*d, *m, map));
+            } else {
+                lengths[l] = 0.0;
             }
         }
     }
@@ -90,12 +100,20 @@ fn pair<T: Texel>(a: T, b: T, map: &Map) -> u64 {
 
 /// The same of values in voxels: all corners have the voxel's.
 #[inline(never)]
-pub(super) fn fetch_cells<T: Texel>(values: &[T], first: &[[u32; LANES]], map: &Map, pairs: &mut Pairs) {
-    for (first, pairs) in first.iter().zip(pairs) {
+pub(super) fn fetch_cells<T: Texel>(
+    values: &[T],
+    first: &[[u32; LANES]],
+    map: &Map,
+    pairs: &mut Pairs,
+    lengths: &mut [[f32; LANES]; STEPS],
+) {
+    for ((first, pairs), lengths) in first.iter().zip(pairs).zip(lengths) {
         for l in 0..LANES {
-            let bits = values.get(first[l] as usize).map_or(0, |v| u64::from(v.bits(map)));
-            for row in &mut *pairs {
-                row[l] = bits | bits << 32;
+            if let Some(v) = values.get(first[l] as usize) {
+                let bits = u64::from(v.bits(map));
+                pairs.iter_mut().for_each(|row| row[l] = bits | bits << 32);
+            } else {
+                lengths[l] = 0.0;
             }
         }
     }

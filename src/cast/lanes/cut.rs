@@ -161,7 +161,9 @@ impl Cut {
     #[inline(always)]
     pub(super) fn flush<S: Simd>(&mut self, simd: S, scene: &Scene) {
         let count = std::mem::take(&mut self.count).min(ROOM);
+        // Lanes without a stretch hold nothing of earlier ones: what is there could show in when the others are done.
         for i in (count..count.next_multiple_of(LANES)).take(LANES) {
+            self.a.iter_mut().for_each(|a| a[i] = 0.0);
             self.length[i] = 0.0;
         }
         for at in (0..count).step_by(LANES) {

@@ -10,6 +10,9 @@ type Lanes = [f32; LANES];
 /// Farther than any plane that a ray meets.
 const NEVER: f32 = 1e30;
 
+/// What makes no stretch of its own at a ray's end, of the way from plane to plane: some roundings of f32.
+const SHORT: f32 = 4e-6;
+
 /// Rays relative to where they began some steps ago, in voxels from the lower planes of the voxel they were in.
 #[derive(Debug, Default)]
 pub(super) struct Near {
@@ -32,6 +35,7 @@ pub(super) struct Near {
     voxel: [u32; LANES],
     t: Lanes,
     end: Lanes,
+    short: Lanes,
 }
 
 /// What eight rays pass in a step: as `walk::Stretch`.
@@ -70,6 +74,7 @@ impl Near {
         }
         (self.index[l], self.voxel[l]) = (index as i64 as u32, voxel as i64 as u32);
         (self.t[l], self.end[l]) = (0.0, (end - t) as f32);
+        self.short[l] = SHORT * self.width.iter().fold(NEVER, |least, width| least.min(width[l]));
     }
 
     /// Begins again where all lanes of `walker` are, in the same voxels.
@@ -108,7 +113,9 @@ impl Near {
         let none = u32x8::splat(simd, 0);
         let (from, end) = (lanes(simd, &self.t), lanes(simd, &self.end));
         let next = [lanes(simd, &self.next[0]), lanes(simd, &self.next[1]), lanes(simd, &self.next[2])];
-        let to = next[0].min(next[1]).min(next[2].min(end));
+        let plane = next[0].min(next[1]).min(next[2].min(end));
+        // What would be left is a rounding's, in a voxel that may be beyond the grid.
+        let to = (end - plane).simd_lt(lanes(simd, &self.short)).select(end, plane);
         let length = to - from;
         let (index, voxel) = (u32x8::load_array_ref(simd, &self.index), u32x8::load_array_ref(simd, &self.voxel));
         let (mut index_behind, mut voxel_behind) = (index, voxel);

@@ -84,9 +84,9 @@ impl Passed {
         let (map, first) = (&scene.lines.map, &self.first[..self.count]);
         with_values!(&*samples.values, v => {
             if samples.of_cells {
-                fetch_cells(v, first, map, &mut self.pairs);
+                fetch_cells(v, first, map, &mut self.pairs, &mut self.length);
             } else {
-                fetch(v, first, scene.rows, map, &mut self.pairs);
+                fetch(v, first, scene.rows, map, &mut self.pairs, &mut self.length);
             }
         });
     }

@@ -155,8 +155,14 @@ fn view(random: &mut Random) -> View {
     view
 }
 
-/// The greatest difference of both ways, and the greatest opacity.
-fn difference(grid: &Grid, field: &Field, transfer: &TransferFunction, view: &View, how: Reconstruction) -> [f32; 2] {
+/// Draws a frame in some way: what is seen of it is known then.
+fn drawn<T>(
+    (grid, field): (&Grid, &Field),
+    transfer: &TransferFunction,
+    view: &View,
+    how: Reconstruction,
+    way: impl FnOnce(&Frame, &Visible, &[bool]) -> T,
+) -> T {
     let volume = Volume::new(grid).unwrap();
     let samples = Samples::new(&volume, field).unwrap();
     let normal = [0, 1, 2, 3].map(|k| field.normal(k));
@@ -173,12 +179,44 @@ fn difference(grid: &Grid, field: &Field, transfer: &TransferFunction, view: &Vi
     };
     let visible = Visible::new(&exact, 1);
     let seen = frame.samples.seen(|low, high| visible.shows(exact.opacity.intervals(low, high)));
-    let Some((got, _)) = render(&frame, &visible, &seen) else { return [0.0; 2] };
-    let all = vec![true; seen.len()];
-    let (want, _) = one_by_one(&frame, &visible, &all);
-    let pairs = got.as_flattened().iter().zip(want.as_flattened());
-    let off = pairs.map(|(a, b)| if a.is_finite() { (a - b).abs() } else { f32::INFINITY }).fold(0.0, f32::max);
-    [off, want.iter().fold(0.0, |most, p| most.max(p[3]))]
+    way(&frame, &visible, &seen)
+}
+
+/// The greatest difference of both ways, and the greatest opacity.
+fn difference(grid: &Grid, field: &Field, transfer: &TransferFunction, view: &View, how: Reconstruction) -> [f32; 2] {
+    drawn((grid, field), transfer, view, how, |frame, visible, seen| {
+        let Some((got, _)) = render(frame, visible, seen) else { return [0.0; 2] };
+        let (want, _) = one_by_one(frame, visible, &vec![true; seen.len()]);
+        let pairs = got.as_flattened().iter().zip(want.as_flattened());
+        let off = pairs.map(|(a, b)| if a.is_finite() { (a - b).abs() } else { f32::INFINITY }).fold(0.0, f32::max);
+        [off, want.iter().fold(0.0, |most, p| most.max(p[3]))]
+    })
+}
+
+/// A thread draws packet after packet in the same memory: nothing of an earlier one may show in a later one.
+#[test]
+fn bits_do_not_depend_on_threads() {
+    let pools = [1, 2, 7].map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap());
+    let mut shown = 0;
+    for seed in 0..150_u64 {
+        let mut random = Random(seed * 104_729 + 7);
+        let (grid, field, ends) = grid(&mut random, true);
+        let (transfer, view) = (transfer(&mut random, ends), view(&mut random));
+        let order = Order::ALL[random.below(Order::ALL.len())].1;
+        let sampling = if seed % 3 == 0 { Sampling::Steps(0.07) } else { Sampling::Voxels };
+        let how = Reconstruction { order, sampling };
+        let bits = pools.each_ref().map(|pool| {
+            pool.install(|| {
+                drawn((&grid, &field), &transfer, &view, how, |frame, visible, seen| {
+                    let pixels = render(frame, visible, seen).map_or(vec![], |(pixels, _)| pixels);
+                    pixels.as_flattened().iter().map(|v| v.to_bits()).collect::<Vec<_>>()
+                })
+            })
+        });
+        shown += usize::from(bits[0].iter().any(|b| *b != 0));
+        assert!(bits[1] == bits[0] && bits[2] == bits[0], "{seed}: {how:?}");
+    }
+    assert!(shown > 80, "{shown} pictures show something");
 }
 
 #[test]

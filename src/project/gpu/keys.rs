@@ -11,7 +11,7 @@ use crate::gpu::rays::FAR;
 use crate::order::MOST_PARTS;
 use crate::order::depth::HIDDEN;
 use crate::project::{Fragments, Order, Switches};
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
 /// Points or cells that one task handles at least.
@@ -56,22 +56,26 @@ const NEAR: u32 = 1;
 fn places(points: &[DVec3], seen: &Seen) -> Vec<Place> {
     let frame = &seen.frame;
     let base = frame.base();
-    let [right, up, forward] = frame.axes();
-    let [size, offset] = [frame.size, frame.offset].map(Vec2::from);
+    let [right, up, forward] = frame.axes().map(Vec3::as_dvec3);
+    let [size, offset] = [frame.size, frame.offset].map(|v| Vec2::from(v).as_dvec2());
     let edge = 1.0 + offset.abs() + 4.0 / size;
+    let [near, far, nearest] = [frame.near, frame.far, frame.nearest].map(f64::from);
+    let ahead = f64::from(frame.ahead());
+    // In f64: a picture may show a millionth of the mesh.
     let place = |p: &DVec3| {
-        let p = (p - base).as_vec3();
-        let z = p.dot(forward);
-        let w = if seen.perspective { z + frame.ahead() } else { 1.0 };
-        let (x, y) = (p.dot(right), p.dot(up));
+        let d = p - base;
+        let z = d.dot(forward);
+        let w = if seen.perspective { z + ahead } else { 1.0 };
+        let (x, y) = (d.dot(right), d.dot(up));
         let beside = [x > edge.x * w, x < -edge.x * w, y > edge.y * w, y < -edge.y * w];
-        let cut = [w <= 0.0, z < frame.near, z > frame.far];
+        let cut = [w <= 0.0, z < near, z > far];
+        let p = d.as_vec3();
         // There are more bits than planes; what planes beyond that cut off is drawn, and fragments find nothing.
         let planes = seen.planes.iter().map(|&[a, b, c, d]| p.dot(Vec3::new(a, b, c)) + d < 0.0);
-        let all = [w < frame.nearest].into_iter().chain(beside).chain(cut).chain(planes);
+        let all = [w < nearest].into_iter().chain(beside).chain(cut).chain(planes);
         let beyond = all.zip(0..u32::BITS).fold(0, |bits, (is, i)| bits | u32::from(is) << i);
-        let pixel = (Vec2::new(x / w - offset.x + 1.0, 1.0 + offset.y - y / w)) * 0.5 * size;
-        Place { p, pixel, beyond }
+        let pixel = DVec2::new(x / w - offset.x + 1.0, 1.0 + offset.y - y / w) * 0.5 * size;
+        Place { p, pixel: pixel.as_vec2(), beyond }
     };
     points.par_iter().with_min_len(LEAST).map(place).collect()
 }
