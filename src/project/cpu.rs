@@ -340,8 +340,7 @@ fn sweep<S: Simd, const N: usize>(
             sequence.push(i);
         }
         fault.inject(&mut sequence);
-        sequence.iter().for_each(|&i| canvas.draw(simd, scene, &frame.integral, crossings, &records[i]));
-        return canvas.flush(simd, scene, frame.integral.exact.direct);
+        return sequence.iter().for_each(|&i| canvas.draw(simd, scene, &frame.integral, crossings, &records[i]));
     }
     while let Some(i) = order.next() {
         if canvas.is_done() {
@@ -350,7 +349,6 @@ fn sweep<S: Simd, const N: usize>(
         cpu::prefetch(records, order.behind(i));
         canvas.draw(simd, scene, &frame.integral, crossings, &records[i]);
     }
-    canvas.flush(simd, scene, frame.integral.exact.direct);
 }
 
 /// Has the walk draw all of a frame.

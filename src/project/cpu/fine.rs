@@ -1,10 +1,10 @@
-//! Fine: the pixels of a cell, 4 × 4 at a time: found, checked, and kept together to be [measured](super::measure).
+//! Fine: the pixels of a cell, 4 × 4 at a time: found, checked, and [measured](super::measure).
 //!
 //! A pixel keeps the key where its last cell ended. The next one must begin there, or a gap must lie between the two where the ray
 //! is outside the mesh, by its crossings of the boundary; at the end nothing of the mesh may be left. A pixel of which that is not
 //! true is flagged, and drawn again by other means. So the picture does not rest on the order of the cells.
 
-use super::lanes::{Floats, Ints, LANES, NUMBERS};
+use super::lanes::{Floats, LANES};
 use super::measure::Fragments;
 use super::setup::{Look, Record, Scene};
 use crate::integral::{Batch, Integral, Light};
@@ -17,9 +17,9 @@ use fearless_simd::prelude::*;
 
 pub(super) const PIXELS: usize = (TILE * TILE) as usize;
 /// Blocks of a tile, in a row and in all.
-const ACROSS: usize = TILE as usize / 4;
+pub(super) const ACROSS: usize = TILE as usize / 4;
 const ROWS: usize = TILE as usize / 4;
-const BLOCKS: usize = PIXELS / LANES;
+pub(super) const BLOCKS: usize = PIXELS / LANES;
 
 /// How far from the end of the last cell the next may begin, in keys, of 1 and of the key; and how much of the mesh may be missed
 /// in a gap.
@@ -29,8 +29,10 @@ const SLACK: f32 = 2e-6;
 const GLANCE: u64 = 4096;
 
 /// Columns and rows of the pixels of a block.
-const ACROSS_BLOCK: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0];
-const DOWN_BLOCK: [f32; LANES] = [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 3.0];
+pub(super) const ACROSS_BLOCK: [f32; LANES] =
+    [0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0];
+pub(super) const DOWN_BLOCK: [f32; LANES] =
+    [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 3.0];
 
 /// Why a pixel is drawn again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,7 +53,7 @@ pub(super) enum Flaw {
 #[derive(Debug)]
 pub(super) struct Canvas<const N: usize> {
     /// Red, green, blue, transmittance.
-    pub(super) light: Box<[[f32; 4]; PIXELS]>,
+    pub(super) light: Box<[[[f32; LANES]; 4]; BLOCKS]>,
     pub(super) largest: Vec<[f32; N]>,
     last: Box<[[f32; LANES]; BLOCKS]>,
     limits: Box<[[[f32; LANES]; BLOCKS]; 2]>,
@@ -61,8 +63,8 @@ pub(super) struct Canvas<const N: usize> {
     /// The number of fragments at which it is looked again for blocks that are done.
     glance: u64,
     corner: [u32; 2],
-    /// The square of the length of a ray for each unit of depth: of 1, x, y, x², y², x y, from the tile's first pixel.
-    pub(super) stretch: [f32; 6],
+    /// The length of each pixel's ray for each unit of depth.
+    pub(super) stretch: Box<[[f32; LANES]; BLOCKS]>,
     eye_inside: bool,
     /// The key of the nearest place that is drawn for sure.
     nearest: f64,
@@ -74,7 +76,7 @@ pub(super) struct Canvas<const N: usize> {
 impl<const N: usize> Canvas<N> {
     pub(super) fn new() -> Self {
         Canvas {
-            light: Box::new([[0.0; 4]; PIXELS]),
+            light: Box::new([[[0.0; LANES]; 4]; BLOCKS]),
             largest: vec![[0.0; N]; PIXELS],
             last: Box::new([[0.0; LANES]; BLOCKS]),
             limits: Box::new([[[0.0; LANES]; BLOCKS]; 2]),
@@ -82,7 +84,7 @@ impl<const N: usize> Canvas<N> {
             alive: [0; ROWS],
             glance: 0,
             corner: [0; 2],
-            stretch: [0.0; 6],
+            stretch: Box::new([[0.0; LANES]; BLOCKS]),
             eye_inside: false,
             nearest: f64::NEG_INFINITY,
             batch: Batch::default(),
@@ -93,7 +95,7 @@ impl<const N: usize> Canvas<N> {
 
     /// Begins the tile whose first pixel is `corner`.
     pub(super) fn clear(&mut self, scene: &Scene<N>, view: &View, crossings: &Crossings, corner: [u32; 2]) {
-        self.light.fill([0.0, 0.0, 0.0, 1.0]);
+        self.light.fill([[0.0; LANES], [0.0; LANES], [0.0; LANES], [1.0; LANES]]);
         if scene.blend == Blend::Maximum {
             self.largest.fill([f32::NEG_INFINITY; N]);
         }
@@ -103,7 +105,14 @@ impl<const N: usize> Canvas<N> {
         self.glance = self.fragments + GLANCE;
         self.nearest = if lens.meet { lens.key(4.0 * NEAREST) } else { f64::NEG_INFINITY };
         let [column, row] = corner.map(f64::from);
-        self.stretch = lens.stretch(column + ASIDE.x, row + ASIDE.y).map(|v| v as f32);
+        let [c, x, y, xx, yy, xy] = lens.stretch(column + ASIDE.x, row + ASIDE.y).map(|v| v as f32);
+        for (block, stretch) in self.stretch.iter_mut().enumerate() {
+            let [left, top] = [block % ACROSS * 4, block / ACROSS * 4].map(|v| v as f32);
+            for l in 0..LANES {
+                let (i, j) = (left + ACROSS_BLOCK[l], top + DOWN_BLOCK[l]);
+                stretch[l] = (c + i * (x + i * xx + j * xy) + j * (y + j * yy)).sqrt();
+            }
+        }
         self.last.as_flattened_mut().copy_from_slice(crossings.first());
         if !lens.limited {
             return;
@@ -140,10 +149,7 @@ impl<const N: usize> Canvas<N> {
     ) {
         match r.look {
             Look::Empty => return,
-            Look::Flat => {
-                self.flush(simd, scene, integral.exact.direct);
-                return self.draw_flat(scene, integral, crossings, r);
-            }
+            Look::Flat => return self.draw_flat(scene, integral, crossings, r),
             Look::Seen | Look::Unseen => {}
         }
         self.found.count = 0;
@@ -154,17 +160,15 @@ impl<const N: usize> Canvas<N> {
             3 => self.find::<S, 3>(simd, crossings, r),
             _ => {}
         }
-        if r.look == Look::Seen && scene.lens.limited {
-            self.found
-                .limit(|at| [self.limits[0][at / LANES][at % LANES], self.limits[1][at / LANES][at % LANES]], r.key);
-        }
         if r.look == Look::Unseen || self.found.count == 0 {
             return;
         }
+        if scene.lens.limited {
+            self.found.limit(simd, &self.limits, r.key);
+        }
         self.measure(simd, scene, integral, r);
-        self.fragments += self.found.count as u64;
+        self.fragments += u64::from(self.found.fragments);
         if r.dark < f32::INFINITY {
-            self.flush(simd, scene, integral.exact.direct);
             self.doubt(r.dark);
         }
         if self.fragments >= self.glance {
@@ -189,10 +193,10 @@ impl<const N: usize> Canvas<N> {
                 // The eye inside: from very near to it. What lies behind it is beyond what is infinitely far.
                 let eye = of(if r.kappa > 0.0 { -1e7 / (r.kappa * r.kappa) } else { f32::NEG_INFINITY });
                 let beyond = of(1.0 / r.kappa);
-                let numbers = Ints::load_array(simd, NUMBERS);
                 let [x0, x1, y0, y1] = r.pixels.map(usize::from);
                 let first_x = (load(&ACROSS_BLOCK) + ((x0 / 4 * 4) as f32 - r.at[0])) - r.rest[0];
-                let mut at = 0;
+                let zero = of(0.0);
+                let (mut at, mut fragments) = (0, 0);
                 for by in y0 / 4..(y1 / 4 + 1).min(ROWS) {
                     // Whole pixels first, which are exact.
                     let y = (load(&DOWN_BLOCK) + ((4 * by) as f32 - r.at[1])) - r.rest[1];
@@ -227,10 +231,13 @@ impl<const N: usize> Canvas<N> {
                         // Not a selection from what was there: that would become a masked store, which some processors do slowly.
                         let end = inside.select(key_out, of(f32::NEG_INFINITY));
                         last.max(end).store_array(&mut self.last[block]);
-                        at += self.found.add(simd, at, inside, enter, leave, numbers + (LANES * block) as i32);
+                        let pixels = inside.to_bitmask().count_ones();
+                        self.found.keep(at, block, inside.select(enter, zero), inside.select(leave, zero));
+                        at += usize::from(pixels > 0);
+                        fragments += pixels;
                     }
                 }
-                self.found.count = at;
+                (self.found.count, self.found.fragments) = (at, fragments);
             },
         );
     }
@@ -238,10 +245,13 @@ impl<const N: usize> Canvas<N> {
     /// Flags pixels through which too much light comes after a cell whose numbers f32 does not tell.
     #[cold]
     fn doubt(&mut self, dark: f32) {
-        for &at in &self.found.pixel[..self.found.count] {
-            let at = at as usize % PIXELS;
-            if self.flaws[at] == Flaw::None && self.light[at][3] > dark {
-                self.flaws[at] = Flaw::Coarse;
+        for i in 0..self.found.count {
+            let block = self.found.block[i] as usize % BLOCKS;
+            for l in (0..LANES).filter(|l| self.found.enter[i][*l] < self.found.leave[i][*l]) {
+                let flaw = &mut self.flaws[LANES * block + l];
+                if *flaw == Flaw::None && self.light[block][3][l] > dark {
+                    *flaw = Flaw::Coarse;
+                }
             }
         }
     }
@@ -253,9 +263,9 @@ impl<const N: usize> Canvas<N> {
         if blend == Blend::Maximum {
             return;
         }
-        for (row, alive) in self.light.chunks(LANES * ACROSS).zip(&mut self.alive) {
-            for (k, block) in row.chunks(LANES).enumerate() {
-                let most = block.iter().fold(0.0, |most: f32, light| most.max(light[3]));
+        for (row, alive) in self.light.chunks(ACROSS).zip(&mut self.alive) {
+            for (k, block) in row.iter().enumerate() {
+                let most = block[3].iter().fold(0.0, |most: f32, t| most.max(*t));
                 *alive &= !(u8::from(most < least) << k);
             }
         }
@@ -279,7 +289,7 @@ impl<const N: usize> Canvas<N> {
             }
             return;
         }
-        let [r, g, b, t] = self.light[at];
+        let [r, g, b, t] = self.light_at(at);
         let mut light = Light { color: [r, g, b], through: t };
         match integral.table {
             None => {
@@ -289,7 +299,13 @@ impl<const N: usize> Canvas<N> {
             Some(table) => table.add(integral.exact, front[N - 1], back[N - 1], length, &mut light),
         }
         let [r, g, b] = light.color;
-        self.light[at] = [r, g, b, light.through];
+        let own = &mut self.light[at / LANES];
+        (own[0][at % LANES], own[1][at % LANES], own[2][at % LANES], own[3][at % LANES]) = (r, g, b, light.through);
+    }
+
+    /// Red, green, blue and transmittance of a pixel.
+    fn light_at(&self, at: usize) -> [f32; 4] {
+        self.light[at / LANES].each_ref().map(|row| row[at % LANES])
     }
 
     /// Draws a cell whose thickness f32 cannot tell, pixel by pixel in f64.
@@ -301,7 +317,6 @@ impl<const N: usize> Canvas<N> {
         let values = scene.corner_values(r.cell, corners);
         let cell = super::flat::Cell::new(lens, corners.map(|p| geometry.points[p as usize]));
         let [x0, x1, y0, y1] = r.pixels.map(u32::from);
-        self.found.count = 0;
         for j in y0..=y1 {
             for i in x0..=x1 {
                 let at = place(i, j);
@@ -334,13 +349,12 @@ impl<const N: usize> Canvas<N> {
                 };
                 let length = ((leave - enter) * lens.length(column, row)) as f32;
                 self.gather(scene.blend, integral, at, &value(enter), &value(leave), length);
-                self.found.pixel[self.found.count] = at as i32;
-                self.found.count += 1;
+                self.fragments += 1;
+                let is_doubtful = scene.blend == Blend::Maximum && self.light_at(at)[3] > r.dark;
+                if is_doubtful && self.flaws[at] == Flaw::None {
+                    self.flaws[at] = Flaw::Coarse;
+                }
             }
-        }
-        self.fragments += self.found.count as u64;
-        if r.dark < f32::INFINITY && scene.blend == Blend::Maximum {
-            self.doubt(r.dark);
         }
         if self.fragments >= self.glance {
             self.rest(least_light(integral.exact.direct), scene.blend);
@@ -414,7 +428,7 @@ impl<const N: usize> Canvas<N> {
                     }
                     *pixel = match scene.blend {
                         Blend::Composite => {
-                            let [r, g, b, t] = self.light[at];
+                            let [r, g, b, t] = self.light_at(at);
                             [r, g, b, 1.0 - t]
                         }
                         Blend::Maximum if self.largest[at][N - 1] == f32::NEG_INFINITY => [0.0; 4],
@@ -429,11 +443,11 @@ impl<const N: usize> Canvas<N> {
     /// Whether a pixel of a block is flawed, or may be at its end.
     fn is_doubtful(&self, block: usize, crossings: &Crossings, least: f32) -> bool {
         let range = LANES * block..LANES * (block + 1);
-        let (ends, light, flaws) = (&crossings.last()[range.clone()], &self.light[range.clone()], &self.flaws[range]);
+        let (ends, light, flaws) = (&crossings.last()[range.clone()], &self.light[block][3], &self.flaws[range]);
         let mut doubtful = false;
         for l in 0..LANES {
             let [missed, beyond] = end(self.last[block][l], ends[l]);
-            doubtful |= missed & (light[l][3] >= least) | beyond | (flaws[l] != Flaw::None);
+            doubtful |= missed & (light[l] >= least) | beyond | (flaws[l] != Flaw::None);
         }
         doubtful
     }
@@ -442,7 +456,7 @@ impl<const N: usize> Canvas<N> {
     fn check_end(&mut self, crossings: &Crossings, at: usize, least: f32) {
         let (last, place) = (self.last[at / LANES][at % LANES], crossings.last()[at]);
         let [missed, beyond] = end(last, place);
-        if missed && self.light[at][3] >= least {
+        if missed && self.light_at(at)[3] >= least {
             self.check_gap(crossings, at, last, place);
         }
         if beyond && self.flaws[at] == Flaw::None {

@@ -2,16 +2,11 @@
 
 use crate::integral::{GAUSS_6, MILD, PANEL, Piece};
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x16, i32x16, mask32x16, u32x16};
+use fearless_simd::{Simd, f32x16, u32x16};
 
 /// As wide as the widest instructions: others do it in parts, with the same result.
 pub(super) const LANES: usize = 16;
 pub(super) type Floats<S> = f32x16<S>;
-pub(super) type Ints<S> = i32x16<S>;
-pub(super) type Mask<S> = mask32x16<S>;
-
-/// The lanes' numbers.
-pub(super) const NUMBERS: [i32; LANES] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 
 /// Optical depth up to which the shorter series holds.
 const FAINT: f32 = 1.0 / 8.0;
@@ -146,30 +141,6 @@ fn exp<S: Simd>(simd: S, x: Floats<S>) -> Floats<S> {
     let biased = bits - u32x16::splat(simd, ROUND.to_bits() - 127);
     let scale: Floats<S> = (biased << 23).bitcast();
     x.simd_lt(of(-87.0)).select(of(0.0), p * scale)
-}
-
-/// Stores the lanes of `some` one after another, and what else follows them in a whole vector.
-#[inline(always)]
-pub(super) fn keep<S: Simd>(simd: S, v: Floats<S>, some: Mask<S>, to: &mut [f32]) {
-    if size_of::<S::f32s>() == size_of::<Floats<S>>() {
-        return v.compress(some).store_slice(&mut to[..LANES]);
-    }
-    let ((low, high), (first, second)) = (v.split(), simd.split_mask32x16(some));
-    low.compress(first).store_slice(&mut to[..LANES / 2]);
-    let at = (first.to_bitmask().count_ones() as usize).min(LANES / 2);
-    high.compress(second).store_slice(&mut to[at..at + LANES / 2]);
-}
-
-/// As [`keep`].
-#[inline(always)]
-pub(super) fn keep_ints<S: Simd>(simd: S, v: Ints<S>, some: Mask<S>, to: &mut [i32]) {
-    if size_of::<S::f32s>() == size_of::<Floats<S>>() {
-        return v.compress(some).store_slice(&mut to[..LANES]);
-    }
-    let ((low, high), (first, second)) = (v.split(), simd.split_mask32x16(some));
-    low.compress(first).store_slice(&mut to[..LANES / 2]);
-    let at = (first.to_bitmask().count_ones() as usize).min(LANES / 2);
-    high.compress(second).store_slice(&mut to[at..at + LANES / 2]);
 }
 
 #[cfg(test)]

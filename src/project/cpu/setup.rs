@@ -1,4 +1,4 @@
-//! Set-up: what the sweep knows of a cell, formed in f64 and kept in f32, four cells at a time.
+//! Set-up: what the sweep knows of a cell, formed in f64 and kept in f32, eight cells at a time.
 //!
 //! A cell is told relative to one of its corners R, at depth w_R, seen at (X_R, Y_R). In the frame that is sheared so that R's
 //! ray is the axis, corner k minus R is e_k = (Δh.x − X_R Δh.z, Δh.y − Y_R Δh.z, Δh.z) with Δh = h_k − h_R ([`crate::order::screen`]). On
@@ -19,7 +19,7 @@ use crate::integral::Exact;
 use crate::order::screen::{ASIDE, Lens, PixelBox, TILE};
 use crate::view::Blend;
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x4, f64x4, u8x16};
+use fearless_simd::{Simd, f32x4, f32x8, f64x8, u8x16};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -45,6 +45,9 @@ const STEEP: f32 = 0.25;
 
 /// The lines of a cell of which nothing is seen.
 pub(super) const UNSEEN: [u16; 2] = [1, 0];
+
+/// Cells that are set up at a time: as wide as the widest instructions, and others do it in parts.
+const EIGHT: usize = 8;
 
 /// Cells that are read together, so that memory has many of them to find at a time.
 const TOGETHER: usize = 32;
@@ -190,7 +193,7 @@ impl<const N: usize> Scene<'_, N> {
     }
 }
 
-type Triple<S> = [f64x4<S>; 3];
+type Triple<S> = [f64x8<S>; 3];
 
 /// The cross product. (Closures that are called more than once need not become part of their caller, where alone the vector
 /// instructions are known.)
@@ -201,7 +204,7 @@ fn cross<S: Simd>(a: Triple<S>, b: Triple<S>) -> Triple<S> {
 
 /// Puts the first corner, relative to the lens's origin, and the edges from there into lane `l`.
 #[inline(always)]
-fn relative(lens: &Lens, p: &[DVec3; 4], l: usize, from: &mut [[f64; 4]; 3], edge: &mut [[[f64; 4]; 3]; 3]) {
+fn relative(lens: &Lens, p: &[DVec3; 4], l: usize, from: &mut [[f64; EIGHT]; 3], edge: &mut [[[f64; EIGHT]; 3]; 3]) {
     let d = p[0] - lens.origin();
     (from[0][l], from[1][l], from[2][l]) = (d.x, d.y, d.z);
     for k in 0..3 {
@@ -212,54 +215,64 @@ fn relative(lens: &Lens, p: &[DVec3; 4], l: usize, from: &mut [[f64; 4]; 3], edg
 
 /// `rows` times the vectors.
 #[inline(always)]
-fn turn<S: Simd>(simd: S, rows: &[DVec3; 3], d: &[[f64; 4]; 3]) -> Triple<S> {
+fn turn<S: Simd>(simd: S, rows: &[DVec3; 3], d: &[[f64; EIGHT]; 3]) -> Triple<S> {
     let (x, y, z) =
-        (f64x4::load_array_ref(simd, &d[0]), f64x4::load_array_ref(simd, &d[1]), f64x4::load_array_ref(simd, &d[2]));
+        (f64x8::load_array_ref(simd, &d[0]), f64x8::load_array_ref(simd, &d[1]), f64x8::load_array_ref(simd, &d[2]));
     let [a, b, c] = rows;
     [
-        x.mul_add(f64x4::splat(simd, a.x), y.mul_add(f64x4::splat(simd, a.y), z * a.z)),
-        x.mul_add(f64x4::splat(simd, b.x), y.mul_add(f64x4::splat(simd, b.y), z * b.z)),
-        x.mul_add(f64x4::splat(simd, c.x), y.mul_add(f64x4::splat(simd, c.y), z * c.z)),
+        x.mul_add(f64x8::splat(simd, a.x), y.mul_add(f64x8::splat(simd, a.y), z * a.z)),
+        x.mul_add(f64x8::splat(simd, b.x), y.mul_add(f64x8::splat(simd, b.y), z * b.z)),
+        x.mul_add(f64x8::splat(simd, c.x), y.mul_add(f64x8::splat(simd, c.y), z * c.z)),
     ]
 }
 
 /// Never 0, of the sign of `v`.
 #[inline(always)]
-fn guard<S: Simd>(v: f64x4<S>, scale: f64x4<S>) -> f64x4<S> {
+fn guard<S: Simd>(v: f64x8<S>, scale: f64x8<S>) -> f64x8<S> {
     v.abs().max(scale * 1e-12 + 1e-280).copysign(v)
 }
 
 /// What two products may be off by.
 #[inline(always)]
-fn terms<S: Simd>(p: Triple<S>, r: Triple<S>) -> f64x4<S> {
+fn terms<S: Simd>(p: Triple<S>, r: Triple<S>) -> f64x8<S> {
     (p[0] * r[1]).abs() + (p[1] * r[0]).abs()
 }
 
-/// Four single floats as doubles.
+/// Single floats as doubles.
 #[inline(always)]
-fn wide<S: Simd>(simd: S, [a, b, c, d]: [f32; 4]) -> f64x4<S> {
-    f64x4::load_array(simd, [f64::from(a), f64::from(b), f64::from(c), f64::from(d)])
+fn wide<S: Simd>(simd: S, v: [f32; EIGHT]) -> f64x8<S> {
+    let mut all = [0.0; EIGHT];
+    for (to, v) in all.iter_mut().zip(v) {
+        *to = f64::from(v);
+    }
+    f64x8::load_array(simd, all)
 }
 
-/// As four single floats.
+/// As single floats.
 #[inline(always)]
-fn single<S: Simd>(simd: S, v: f64x4<S>) -> f32x4<S> {
-    let [a, b, c, d] = v.to_array();
-    f32x4::load_array(simd, [a as f32, b as f32, c as f32, d as f32])
+fn single<S: Simd>(simd: S, v: f64x8<S>) -> f32x8<S> {
+    let mut all = [0.0; EIGHT];
+    for (to, v) in all.iter_mut().zip(v.to_array()) {
+        *to = v as f32;
+    }
+    f32x8::load_array(simd, all)
 }
 
-/// Four numbers of four cells, cell by cell.
+/// Four numbers of each cell, cell by cell.
 #[inline(always)]
-fn by_cell<S: Simd>(simd: S, v: [f32x4<S>; 4]) -> [[f32; 4]; 4] {
-    let mut all = [0.0; 16];
-    simd.store_four_interleaved_f32x4(v, &mut all);
-    let (rows, _) = all.as_chunks::<4>();
-    [rows[0], rows[1], rows[2], rows[3]]
+fn by_cell<S: Simd>(simd: S, [a, b, c, d]: [f32x8<S>; 4]) -> [[f32; 4]; EIGHT] {
+    let (a, b, c, d) = (a.split(), b.split(), c.split(), d.split());
+    let mut all = [[0.0; 16]; 2];
+    simd.store_four_interleaved_f32x4([a.0, b.0, c.0, d.0], &mut all[0]);
+    simd.store_four_interleaved_f32x4([a.1, b.1, c.1, d.1], &mut all[1]);
+    let mut rows = [[0.0; 4]; EIGHT];
+    rows.as_flattened_mut().copy_from_slice(all.as_flattened());
+    rows
 }
 
 /// As [`by_cell`], of doubles.
 #[inline(always)]
-fn singles<S: Simd>(simd: S, v: [f64x4<S>; 4]) -> [[f32; 4]; 4] {
+fn singles<S: Simd>(simd: S, v: [f64x8<S>; 4]) -> [[f32; 4]; EIGHT] {
     by_cell(simd, [single(simd, v[0]), single(simd, v[1]), single(simd, v[2]), single(simd, v[3])])
 }
 
@@ -281,10 +294,10 @@ pub(super) fn set_up<S: Simd, const N: usize>(
             }
             read.values = scene.corner_values(cell, corners);
         }
-        for (four, read) in some.chunks(4).zip(read.chunks_mut(4)) {
+        for (eight, read) in some.chunks(EIGHT).zip(read.chunks_mut(EIGHT)) {
             simd.vectorize(
                 #[inline(always)]
-                || set_up_four(simd, scene, four, read, corner, records),
+                || set_up_eight(simd, scene, eight, read, corner, records),
             );
         }
     }
@@ -297,9 +310,9 @@ struct Read<const N: usize> {
     values: [[f32; N]; 4],
 }
 
-/// Appends the records of up to four cells.
+/// Appends the records of up to eight cells.
 #[inline(always)]
-fn set_up_four<S: Simd, const N: usize>(
+fn set_up_eight<S: Simd, const N: usize>(
     simd: S,
     scene: &Scene<N>,
     cells: &[u32],
@@ -308,15 +321,15 @@ fn set_up_four<S: Simd, const N: usize>(
     records: &mut Vec<Record<N>>,
 ) {
     let lens = scene.lens;
-    let zero = [0.0; 4];
+    let zero = [0.0; EIGHT];
     // The first corner from the lens's origin, the others from it: x, y, z.
-    let mut from = [zero, zero, [1.0; 4]];
+    let mut from = [zero, zero, [1.0; EIGHT]];
     let mut edge = [[zero; 3]; 3];
-    let mut first = [0_usize; 4];
+    let mut first = [0_usize; EIGHT];
     for (l, read) in read[..cells.len()].iter().enumerate() {
         relative(lens, &read.corners, l, &mut from, &mut edge);
     }
-    let of = |v: f64| f64x4::splat(simd, v);
+    let of = |v: f64| f64x8::splat(simd, v);
     let (none, one) = (of(0.0), of(1.0));
     let rows = lens.rows();
     let mut h = turn(simd, &rows, &from);
@@ -367,9 +380,9 @@ fn set_up_four<S: Simd, const N: usize>(
         (planes[1][i + 1], planes[2][i + 1]) = (none - f * a[i][0], none - f * a[i][1]);
     }
     let scale = [terms(e[1], e[2]), terms(e[2], e[0]), terms(e[0], e[1])];
-    let turned = |v: f64x4<S>| v.simd_gt(none).to_bitmask();
+    let turned = |v: f64x8<S>| v.simd_gt(none).to_bitmask();
     let fronts = [turned(none - c), turned(a[0][2]), turned(a[1][2]), turned(a[2][2])];
-    let doubtful = |v: f64x4<S>, scale: f64x4<S>| v.abs().simd_le(scale * EDGE_ON).to_bitmask();
+    let doubtful = |v: f64x8<S>, scale: f64x8<S>| v.abs().simd_le(scale * EDGE_ON).to_bitmask();
     let doubts = [
         doubtful(c, m * (scale[0] + scale[1] + scale[2])),
         doubtful(a[0][2], scale[0]),
@@ -397,11 +410,11 @@ fn set_up_four<S: Simd, const N: usize>(
     let places = singles(simd, [column - corner[0], row - corner[1], right - column, down - row]);
     let keys = singles(simd, [key, ratio, one / ratio, kappa]);
     let planes = [singles(simd, planes[0]), singles(simd, planes[1]), singles(simd, planes[2])];
-    let mut fields = [[[0.0; 4]; 4]; N];
-    let mut spans = [[[0.0; 4]; 2]; N];
-    let mut finite = f32x4::splat(simd, 0.0);
+    let mut fields = [[[0.0; 4]; EIGHT]; N];
+    let mut spans = [[[0.0; EIGHT]; 2]; N];
+    let mut finite = f32x8::splat(simd, 0.0);
     for n in 0..N {
-        let mut v = [[0.0; 4]; 4];
+        let mut v = [[0.0; EIGHT]; 4];
         for (l, read) in read[..cells.len()].iter().enumerate() {
             for (v, value) in v.iter_mut().zip(&read.values) {
                 v[l] = value[n];
@@ -410,10 +423,10 @@ fn set_up_four<S: Simd, const N: usize>(
         let start = wide(simd, v[0]);
         let rise = [wide(simd, v[1]) - start, wide(simd, v[2]) - start, wide(simd, v[3]) - start];
         let v = [
-            f32x4::load_array(simd, v[0]),
-            f32x4::load_array(simd, v[1]),
-            f32x4::load_array(simd, v[2]),
-            f32x4::load_array(simd, v[3]),
+            f32x8::load_array(simd, v[0]),
+            f32x8::load_array(simd, v[1]),
+            f32x8::load_array(simd, v[2]),
+            f32x8::load_array(simd, v[3]),
         ];
         let slope = |x: usize| (rise[0] * a[0][x] + rise[1] * a[1][x] + rise[2] * a[2][x]) * over;
         fields[n] =
@@ -423,7 +436,7 @@ fn set_up_four<S: Simd, const N: usize>(
         // NaN if any is not finite.
         finite += v[0] * 0.0 + v[1] * 0.0 + v[2] * 0.0 + v[3] * 0.0;
     }
-    let finite = finite.simd_eq(f32x4::splat(simd, 0.0)).to_bitmask();
+    let finite = finite.simd_eq(f32x8::splat(simd, 0.0)).to_bitmask();
     let extents = extent.to_array();
     let end = lens.size.map(|n| n - 1);
     for (l, &cell) in cells.iter().enumerate() {
