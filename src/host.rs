@@ -16,6 +16,7 @@ use crate::image::Image;
 use crate::integral::Choice;
 use crate::mesh::Mesh;
 use crate::mesh::cells::Tetrahedra;
+use crate::project::Switches;
 use crate::render::{Renderer, Stats};
 use crate::transfer::TransferFunction;
 use crate::view::View;
@@ -115,6 +116,11 @@ impl Session {
         choice.check(choice.size(0))?;
         self.renderer.set_integral(choice);
         Ok(())
+    }
+
+    /// Draws by another variant of the projection engine from now on; nothing to other engines.
+    pub fn set_switches(&mut self, switches: Switches) {
+        self.renderer.set_switches(switches);
     }
 
     /// Rebuilds the fields of regular and rectilinear grids between samples by an order that options know by this name, or

@@ -20,13 +20,14 @@ mod second;
 pub use opaque::Opaque;
 pub use reader::read;
 pub use regions::regions;
-pub use second::widget;
+pub use second::{look, widget};
 
 use crate::cast::Reconstruction;
 use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::field::{Association, Component, Field};
 use crate::grid::Grid;
+use crate::integral::choice::{Choice, MOST_PIECES};
 use crate::memory;
 use crate::mesh::{Array, Arrays};
 use crate::transfer::TransferFunction;
@@ -221,24 +222,47 @@ impl Scene {
             return Ok((view, None));
         }
         let behind = self.background.unwrap_or_default().map(|c| c as f32);
-        let [w, h] = self.size;
-        let pixels = u64::from(w) * u64::from(h) * (size_of::<f64>() + size_of::<[f32; 3]>()) as u64;
-        memory::check(&format!("the opaque objects in {w}x{h} pixels"), pixels)?;
-        let (mut values, mut backdrop) = (Vec::new(), Vec::new());
-        for (j, i) in (0..h).flat_map(|j| (0..w).map(move |i| (j, i))) {
-            let mut ray = view.ray(i, j);
-            let mut color = behind;
-            for object in &self.opaque {
-                if let Some((t, c)) = object.hit(&ray) {
-                    ray.t_max = t;
-                    color = c.map(|c| c as f32);
-                }
-            }
-            values.push(ray.t_max);
-            backdrop.push(color);
-        }
-        Ok((view.with_depth(DepthBuffer { kind: DepthKind::Ray, values })?, Some(backdrop)))
+        behind_volume(view, &self.opaque, behind).map(|(view, backdrop)| (view, Some(backdrop)))
     }
+}
+
+/// `view`, whose rays end at opaque objects too, and what is seen of these, over a background.
+///
+/// # Errors
+/// [`Error::NoMemory`] if the picture is too large.
+pub fn behind_volume(view: View, opaque: &[Opaque], background: [f32; 3]) -> Result<(View, Backdrop)> {
+    let [w, h] = view.size();
+    let pixels = u64::from(w) * u64::from(h) * (size_of::<f64>() + size_of::<[f32; 3]>()) as u64;
+    memory::check(&format!("the opaque objects in {w}x{h} pixels"), pixels)?;
+    let (mut values, mut backdrop) = (Vec::new(), Vec::new());
+    for (j, i) in (0..h).flat_map(|j| (0..w).map(move |i| (j, i))) {
+        let mut ray = view.ray(i, j);
+        let mut color = background;
+        for object in opaque {
+            if let Some((t, c)) = object.hit(&ray) {
+                ray.t_max = t;
+                color = c.map(|c| c as f32);
+            }
+        }
+        values.push(ray.t_max);
+        backdrop.push(color);
+    }
+    Ok((view.with_depth(DepthBuffer { kind: DepthKind::Ray, values })?, backdrop))
+}
+
+/// A form of the ray integral as scenes say it: by its name, or as an object.
+///
+/// # Errors
+/// What is wrong, and where in the value.
+pub fn integral(value: &Value) -> std::result::Result<Choice, String> {
+    if let Value::String(name) = value {
+        return Choice::default().named(name);
+    }
+    let choice: Choice = read(value)?;
+    if !(1..=MOST_PIECES).contains(&choice.two.pieces) {
+        return Err(format!("two: pieces: there are 1 to {MOST_PIECES}"));
+    }
+    Ok(choice)
 }
 
 #[cfg(test)]

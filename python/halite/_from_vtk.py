@@ -1,18 +1,26 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """Grids of VTK, of any release from 9.1 on, as meshes."""
+from __future__ import annotations
+
 import warnings
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
 
 from ._halite import Error
 
+if TYPE_CHECKING:
+    from ._mesh import Mesh
 
-def _numpy(array):
+
+def _numpy(array: Any) -> Any:
+    """VTK's array as numpy's, without a copy but of arrays that are not in one piece."""
     from vtkmodules.util.numpy_support import vtk_to_numpy
-    return vtk_to_numpy(array)
+    return vtk_to_numpy(array)  # type: ignore[no-untyped-call]
 
 
-def cell_types(grid):
+def cell_types(grid: Any) -> Any:
     """VTK's type of each cell of an unstructured grid, as VTK's array; none of a grid without cells."""
     if not grid.GetNumberOfCells():
         return None
@@ -24,8 +32,8 @@ def cell_types(grid):
         return grid.GetCellTypesArray()
 
 
-def _data(attributes):
-    arrays = {}
+def _data(attributes: Any) -> dict[str, Any]:
+    arrays: dict[str, Any] = {}
     active = attributes.GetScalars()
     listed = [attributes.GetArray(i) for i in range(attributes.GetNumberOfArrays())]
     # The active array is the first, which is drawn by default.
@@ -35,19 +43,24 @@ def _data(attributes):
         name = array.GetName() or ("scalars" if array is active else "")
         if name and name not in arrays:
             arrays[name] = _numpy(array)
+    # What curved cells are made by is found by its name, whatever the array is called.
+    for role in ("HigherOrderDegrees", "RationalWeights"):
+        array = getattr(attributes, f"Get{role}")()
+        if array is not None and role not in arrays and array.GetNumberOfTuples():
+            arrays[role] = _numpy(array)
     return arrays
 
 
-def mesh(cls, grid):
+def mesh(cls: type[Mesh], grid: Any) -> Mesh:
     """The mesh of a grid; `cls` is halite.Mesh."""
     kinds = ("vtkUnstructuredGrid", "vtkStructuredGrid", "vtkImageData", "vtkRectilinearGrid")
     kind = next((k for k in kinds if hasattr(grid, "IsA") and grid.IsA(k)), None)
     if kind is None:
         name = grid.GetClassName() if hasattr(grid, "GetClassName") else type(grid).__name__
         raise Error(f"a {name} has no volume to draw: vtkUnstructuredGrid, vtkStructuredGrid, vtkImageData and vtkRectilinearGrid have")
-    data = {"point_data": _data(grid.GetPointData()), "cell_data": _data(grid.GetCellData())}
+    data: dict[str, Any] = {"point_data": _data(grid.GetPointData()), "cell_data": _data(grid.GetCellData())}
     if kind == "vtkImageData":
-        direction = np.reshape([grid.GetDirectionMatrix().GetElement(i, j) for i in range(3) for j in range(3)], (3, 3))
+        direction: Any = np.reshape([grid.GetDirectionMatrix().GetElement(i, j) for i in range(3) for j in range(3)], (3, 3))
         return cls.image(grid.GetDimensions(), origin=grid.GetOrigin(), spacing=grid.GetSpacing(), direction=direction,
                          extent_start=grid.GetExtent()[::2], **data)
     if kind == "vtkRectilinearGrid":
@@ -66,7 +79,7 @@ def mesh(cls, grid):
                            faces=_faces(grid, types) if np.any(types == 42) else None, **data)
 
 
-def _hexahedra(dimensions):
+def _hexahedra(dimensions: Sequence[int]) -> tuple[Any, Any, Any]:
     """The cells of a structured grid: connectivity, offsets, types."""
     nx, ny, nz = dimensions
     if min(dimensions) < 2:
@@ -79,7 +92,7 @@ def _hexahedra(dimensions):
     return connectivity.ravel(), np.arange(len(first) + 1) * 8, np.full(len(first), 12)
 
 
-def _faces(grid, types):
+def _faces(grid: Any, types: Any) -> Optional[Sequence[Any]]:
     """The faces of polyhedra: where those of each cell start, where the points of each start, and these."""
     if hasattr(grid, "GetPolyhedronFaces"):
         # From 9.4 on: cells of faces, and faces of points. A cell's faces are numbers, not always a range.
@@ -87,16 +100,17 @@ def _faces(grid, types):
         if of_cells is None or faces is None:
             return None
         starts, ids = _numpy(of_cells.GetOffsetsArray()), _numpy(of_cells.GetConnectivityArray())
-        offsets, points = _numpy(faces.GetOffsetsArray()), _numpy(faces.GetConnectivityArray())
+        offsets, all_points = _numpy(faces.GetOffsetsArray()), _numpy(faces.GetConnectivityArray())
         sizes = np.diff(offsets)[ids]
         chosen = np.concatenate([[0], np.cumsum(sizes)])
         at = np.repeat(offsets[ids], sizes) + np.arange(chosen[-1]) - np.repeat(chosen[:-1], sizes)
-        return starts, chosen, points[at.astype(np.int64)]
+        return starts, chosen, all_points[at.astype(np.int64)]
     stream, locations = grid.GetFaces(), grid.GetFaceLocations()
     if stream is None or locations is None:
         return None
     stream, locations = _numpy(stream), _numpy(locations)
-    starts, offsets, points = [0], [0], []
+    first, ends = [0], [0]
+    points: list[Any] = []
     for cell in range(len(types)):
         count = 0
         if types[cell] == 42 and locations[cell] >= 0:
@@ -105,7 +119,7 @@ def _faces(grid, types):
             for _ in range(count):
                 n = stream[at]
                 points.append(stream[at + 1:at + 1 + n])
-                offsets.append(offsets[-1] + n)
+                ends.append(ends[-1] + n)
                 at += 1 + n
-        starts.append(starts[-1] + count)
-    return starts, offsets, np.concatenate(points) if points else []
+        first.append(first[-1] + count)
+    return first, ends, np.concatenate(points) if points else []

@@ -3,12 +3,22 @@
 
 >>> import pyvista
 >>> import halite.pyvista
->>> plotter = pyvista.Plotter()
->>> actor = halite.pyvista.add_volume(plotter, grid, scalars="pressure", cmap="inferno", opacity="sigmoid")  # doctest: +SKIP
+>>> plotter = pyvista.Plotter(off_screen=True)
+>>> volume = halite.pyvista.add_volume(plotter, grid, scalars="pressure", cmap="inferno", opacity="sigmoid")
 
-Translucent geometry goes under the volume, and `enable_ssao` does not know it.
+What :mod:`halite.vtk` says of its limits holds: translucent geometry goes under the volume, ``enable_ssao`` is refused, exports (to HTML, glTF and
+others) leave the volume out and warn of it once. Views that a server draws, those of trame and notebooks, show it; those that a browser draws do
+not.
 """
+from __future__ import annotations
+
+import functools
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Optional, Union
+
 import numpy as np
+import numpy.typing as npt
 import pyvista
 from pyvista.plotting.colors import get_cmap_safe
 
@@ -20,9 +30,18 @@ __all__ = ["add_volume"]
 
 # What pictures tell, and PyVista's opacities are made of.
 _BYTE = 1 / 255
+# Keywords of Plotter.add_volume that mean nothing here, and why.
+_REFUSED = {
+    "resolution": "a grid has a spacing of its own",
+    "mapper": "Halite draws every kind of grid",
+    "categories": "colours are continuous; cmap takes a list of colours, and n_colors their number",
+    "culling": "a volume has no faces",
+    "multi_colors": "one grid is drawn at a time",
+}
+_EXPORTS = ("export_gltf", "export_html", "export_obj", "export_vrml", "export_vtksz")
 
 
-def _bends(places, values, tolerance):
+def _bends(places: Any, values: Any, tolerance: float) -> list[int]:
     """Which of the points of a function are needed, if lines between them may be so far off at the others."""
     kept, first = [0], 0
     while first < len(places) - 1:
@@ -44,46 +63,131 @@ def _bends(places, values, tolerance):
     return kept
 
 
-def add_volume(plotter, volume, scalars=None, *, clim=None, cmap=None, opacity="linear", n_colors=256, log_scale=False,
-               opacity_unit_distance=None, shade=False, ambient=0.1, diffuse=0.7, specular=0.2, specular_power=10.0,
-               blending="composite", show_scalar_bar=None, scalar_bar_args=None, name=None, reset_camera=None, render=True,
-               preference="point", component=None, silhouette=None, gradient_opacity=(), pickable=False, threads=0,
-               device="auto", engine="auto"):
+def _warning(export: Callable[..., Any], warned: list[str]) -> Callable[..., Any]:
+    """An export that says once that it leaves volumes of Halite out."""
+    @functools.wraps(export)
+    def warn(*arguments: Any, **keywords: Any) -> Any:
+        if not warned:
+            warned.append(export.__name__)
+            warnings.warn(f"{export.__name__}: what is exported has no volume of Halite, which is drawn as a picture; "
+                          "screenshots and views drawn by a server have", UserWarning, stacklevel=2)
+        return export(*arguments, **keywords)
+    return warn
+
+
+def _refuse_ssao(*_: Any, **__: Any) -> None:
+    raise Error("enable_ssao: PyVista's ambient occlusion does not know volumes of Halite")
+
+
+def _limit(plotter: Any) -> None:
+    """Has a plotter say what it cannot do with the volume."""
+    if getattr(plotter.export_html, "__name__", "") == "export_html" and not hasattr(plotter.export_html, "__wrapped__"):
+        warned: list[str] = []
+        for name in _EXPORTS:
+            if hasattr(plotter, name):
+                setattr(plotter, name, _warning(getattr(plotter, name), warned))
+        plotter.enable_ssao = _refuse_ssao
+
+
+def add_volume(plotter: pyvista.Plotter, volume: Any, scalars: Union[str, npt.ArrayLike, None] = None, *,
+               clim: Union[float, Sequence[float], None] = None, cmap: Any = None, opacity: Any = "linear", n_colors: int = 256,
+               flip_scalars: bool = False, log_scale: bool = False, opacity_unit_distance: Optional[float] = None,
+               shade: bool = False, ambient: float = 0.1, diffuse: float = 0.7, specular: float = 0.2, specular_power: float = 10.0,
+               blending: str = "composite", show_scalar_bar: Optional[bool] = None,
+               scalar_bar_args: Optional[Mapping[str, Any]] = None, annotations: Optional[Mapping[float, str]] = None,
+               name: Optional[str] = None, reset_camera: Optional[bool] = None, render: bool = True, preference: str = "point",
+               user_matrix: Optional[npt.ArrayLike] = None, component: Union[int, str, None] = None,
+               silhouette: Optional[float] = None, gradient_opacity: npt.ArrayLike = (), pickable: bool = False, coarse: int = 2,
+               threads: int = 0, device: str = "auto", engine: str = "auto", **refused: Any) -> Volume:
     """Add a volume to a plotter; keywords are those of ``Plotter.add_volume`` where they mean the same.
 
     Parameters
     ----------
     plotter : pyvista.Plotter
+        Of any kind; with subplots, the active one.
     volume : pyvista.UnstructuredGrid, StructuredGrid, ImageData or RectilinearGrid
-        Cells of any kind, without a triangulation.
+        Cells of any kind, without a triangulation. Followed when it is modified.
     scalars : str or array, optional
-        An array of the mesh by name, or values of its points or cells.
-    clim : pair of float, optional
-        The range of scalars; that of the array by default.
+        An array of the mesh by name, or values of its points or cells; the active one by default.
+    clim : float or two floats, optional
+        The range of scalars that colours and opacities lie over; one number is -clim to clim. The array's range by default.
     cmap : str, list or colour map of matplotlib, optional
         The theme's by default.
     opacity : float, str or array
-        As PyVista has it: "linear", "sigmoid", "geom", with "_r", "sigmoid_5", one opacity, or opacities over the range.
+        As PyVista has it: "linear", "sigmoid", "geom", with "_r", "sigmoid_5", one opacity, or opacities over the range, in [0, 1].
+    n_colors : int
+        How many colours are taken from the map, and opacities from a function by name; colours are linear between them.
+    flip_scalars : bool
+        Turns the colour map round.
+    log_scale : bool
+        Colours and opacities lie over the logarithm of the scalars, which are above 0.
     opacity_unit_distance : float, optional
-        The length that they are meant for; about the size of a cell by default.
+        The length that opacities are meant for, in world units; about the size of a cell by default. (PyVista has 1 for
+        unstructured grids.)
+    shade : bool
+        Whether it is lit from the eye, with the gradient as normal.
+    ambient, diffuse, specular, specular_power : float
+        With `shade`: 0 or more.
     blending : {"composite", "maximum"}
+        The integral, or the largest value along each ray.
+    show_scalar_bar : bool, optional
+        As the theme has it by default.
+    scalar_bar_args : dict, optional
+        As of ``Plotter.add_scalar_bar``.
+    annotations : dict of float to str, optional
+        Texts at values, on the scalar bar.
+    name : str, optional
+        Takes the place of what was added by this name.
+    reset_camera, render
+        As of ``Plotter.add_volume``.
+    preference : {"point", "cell"}
+        Where `scalars` is searched first.
+    user_matrix : array of shape (4, 4), optional
+        Where the volume stands in the world; affine.
+    component : int or "all", optional
+        As of :class:`halite.Renderer`.
     silhouette, gradient_opacity
         As of :class:`halite.TransferFunction`.
+    pickable : bool
+        Whether pickers that know the bounds of props alone find it.
+    coarse : int
+        As of :class:`halite.vtk.Volume`.
     threads, device, engine
         As of :class:`halite.Renderer`.
+    **refused
+        Other keywords of ``Plotter.add_volume``, which have no meaning here.
 
     Returns
     -------
     halite.vtk.Volume
         A vtkVolume.
+
+    Raises
+    ------
+    Error
+        If there is no such array, or the plotter has ambient occlusion (``enable_ssao``).
+    TypeError
+        For a keyword that has no meaning here.
+    ValueError
+        If `blending` is another, or a logarithm has no place.
+
+    Examples
+    --------
+    >>> plotter = pyvista.Plotter(off_screen=True)
+    >>> volume = halite.pyvista.add_volume(plotter, grid, "pressure", clim=(0, 1), cmap="magma", opacity=[0, 0.2, 1])
+    >>> plotter.remove_actor(volume)
+    True
     """
-    grid = pyvista.wrap(volume)
+    for keyword in refused:
+        raise TypeError(f'add_volume: the keyword "{keyword}" has no meaning here: {_REFUSED[keyword]}' if keyword in _REFUSED else
+                        f'add_volume: there is no keyword "{keyword}"')
     if blending not in ("composite", "maximum"):
         raise ValueError(f'blending is "composite" or "maximum", and not "{blending}"')
+    grid = pyvista.wrap(volume)
     if scalars is not None and not isinstance(scalars, str):
-        values = np.asarray(scalars)
+        given = np.asarray(scalars)
         grid, scalars = grid.copy(deep=False), "Data"
-        (grid.point_data if len(values) == grid.n_points else grid.cell_data)[scalars] = values
+        (grid.point_data if len(given) == grid.n_points else grid.cell_data)[scalars] = given
     if scalars is None:
         scalars = grid.active_scalars_name or next(iter(grid.array_names), None)
     if scalars is None:
@@ -93,21 +197,19 @@ def add_volume(plotter, volume, scalars=None, *, clim=None, cmap=None, opacity="
     if association is None:
         raise Error(f'no array is called "{scalars}"; there are ' + ", ".join(f'"{n}"' for n in grid.array_names))
     values = np.asarray((grid.point_data if association == "point" else grid.cell_data)[scalars])
-    if values.ndim > 1:
-        values = values[:, component] if isinstance(component, int) else np.linalg.norm(values, axis=1)
-    finite = values[np.isfinite(values) & (values > 0 if log_scale else True)]
-    low, high = (float(x) for x in (clim if clim is not None else (finite.min(), finite.max()) if len(finite) else (0, 1)))
-    if log_scale and low <= 0:
-        raise ValueError(f"log_scale: the range begins at {low}, and only what is above 0 has a logarithm")
-    if not high > low:
-        high = low + max(1.0, abs(low)) * 1e-6
+    low, high = _limits(clim, values, component, log_scale)
     if opacity_unit_distance is None:
         opacity_unit_distance = grid.length / max(2.0, round(max(grid.n_cells, 1) ** (1 / 3)))
-    table = pyvista.LookupTable(cmap if cmap is not None else plotter._theme.cmap, n_values=n_colors, scalar_range=(low, high),
-                                log_scale=log_scale)
+    table = pyvista.LookupTable()
+    map_of_colors = get_cmap_safe(cmap if cmap is not None else plotter._theme.cmap)
+    map_of_colors = map_of_colors.reversed() if flip_scalars else map_of_colors
+    table.apply_cmap(map_of_colors, n_colors)
+    table.scalar_range, table.log_scale = (low, high), log_scale
+    if annotations is not None:
+        table.annotations = dict(annotations)
     shares = np.linspace(0, 1, n_colors)
     places = np.exp(np.log(low) + (np.log(high) - np.log(low)) * shares) if log_scale else low + (high - low) * shares
-    colors = get_cmap_safe(cmap if cmap is not None else plotter._theme.cmap)(shares)[:, :3]
+    colors = map_of_colors(shares)[:, :3]
     colors = np.column_stack([places, colors])[_bends(shares, colors, 0.5 * _BYTE)]
     if isinstance(opacity, (int, float)):
         alphas = np.full((n_colors, 1), float(opacity))
@@ -120,16 +222,34 @@ def add_volume(plotter, volume, scalars=None, *, clim=None, cmap=None, opacity="
         shade=(ambient, diffuse, specular, specular_power) if shade else None, silhouette=silhouette,
         gradient_opacity=gradient_opacity)
     actor = Volume(grid, scalars, transfer=transfer, association=association, component=component,
-                   maximum=blending == "maximum", threads=threads, device=device, engine=engine)
+                   maximum=blending == "maximum", coarse=coarse, threads=threads, device=device, engine=engine)
+    if user_matrix is not None:
+        actor.SetUserMatrix(pyvista.vtkmatrix_from_array(np.asarray(user_matrix, float)))
     actor.SetPickable(pickable)
     actor._watch(plotter.renderer)
-    plotter.add_actor(actor, name=name, reset_camera=reset_camera, pickable=pickable, render=False)
+    _limit(plotter)
+    target: Any = plotter
+    target.add_actor(actor, name=name, reset_camera=reset_camera, pickable=pickable, render=False)
     if plotter._theme.show_scalar_bar if show_scalar_bar is None else show_scalar_bar:
         mapper = pyvista.DataSetMapper()
         mapper.lookup_table = table
         mapper.scalar_range = (low, high)
-        arguments = {"title": scalars, **(scalar_bar_args or {})}
-        plotter.add_scalar_bar(mapper=mapper, **arguments)
+        plotter.add_scalar_bar(mapper=mapper, **{"title": scalars, **(scalar_bar_args or {})})
     if render and plotter.render_window is not None and getattr(plotter, "_rendered_first_time", False):
         plotter.render()
     return actor
+
+
+def _limits(clim: Any, values: Any, component: Any, log_scale: bool) -> tuple[float, float]:
+    """The range that colours lie over: as asked for, or that of the finite values."""
+    if clim is None:
+        if values.ndim > 1:
+            values = values[:, component] if isinstance(component, int) else np.linalg.norm(values, axis=1)
+        finite = values[np.isfinite(values) & (values > 0 if log_scale else True)]
+        clim = (finite.min(), finite.max()) if len(finite) else (0, 1)
+    elif isinstance(clim, (int, float)):
+        clim = (-clim, clim)
+    low, high = (float(x) for x in clim)
+    if log_scale and low <= 0:
+        raise ValueError(f"log_scale: the range begins at {low}, and only what is above 0 has a logarithm")
+    return low, high if high > low else low + max(1.0, abs(low)) * 1e-6

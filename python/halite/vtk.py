@@ -3,58 +3,57 @@
 
 >>> from vtkmodules.vtkRenderingCore import vtkRenderer
 >>> import halite.vtk
->>> volume = halite.vtk.add_volume(vtkRenderer(), grid, "pressure")  # doctest: +SKIP
+>>> renderer = vtkRenderer()
+>>> volume = halite.vtk.add_volume(renderer, grid, "pressure")
+>>> renderer.GetVolumes().GetNumberOfItems()
+1
 
 A volume whose own mapper draws nothing carries the bounds; when it is its turn, after opaque geometry, the picture is made for the
-camera and the depths of that moment and composited. So opaque geometry may stand before, behind and inside. Translucent geometry
-goes under the volume.
+camera and the depths of that moment and composited. So opaque geometry may stand before, behind and inside.
+
+What it cannot do: translucent geometry goes under the volume; several volumes go over each other in the order in which they were
+added to the renderer; VTK's ambient occlusion (SSAO) is refused with an error; exporters leave the volume out; and windows have 8 bits for each
+colour. What goes wrong in a frame is raised by the window's ``Render`` that asked for it; where VTK asked itself, while a user drags
+or for a tiled screenshot, it goes to ``sys.excepthook``, and the window lives on.
 """
+from __future__ import annotations
+
 import time
 import weakref
+from typing import Any, Optional
 
 import numpy as np
 
 import vtkmodules.vtkRenderingVolumeOpenGL2  # noqa: F401
-from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
-from vtkmodules.vtkCommonCore import vtkFloatArray
+from vtkmodules.util import numpy_support
 from vtkmodules.vtkCommonDataModel import vtkImageData, vtkPiecewiseFunction
 from vtkmodules.vtkRenderingCore import vtkRenderer, vtkVolume
-from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLFramebufferObject, vtkOpenGLQuadHelper, vtkTextureObject
 from vtkmodules.vtkRenderingVolume import vtkFixedPointVolumeRayCastMapper
 
-from . import Mesh, Renderer, View
+from . import Error, Mesh, Renderer, TransferFunction, View
 from ._from_vtk import cell_types
+from ._window import Frames, area, composite, depths, rows
 
 __all__ = ["Volume", "add_volume"]
+
+_support: Any = numpy_support
 
 _BLEND, _DEPTH_TEST, _SCISSOR_TEST, _CULL_FACE = 0x0BE2, 0x0B71, 0x0C11, 0x0B44
 _ONE, _ONE_MINUS_SRC_ALPHA, _FUNC_ADD = 1, 0x0303, 0x8006
 _VIEWPORT, _DRAW_FRAMEBUFFER = 0x0BA2, 0x8CA6
-_FLOAT = 10
-_VERTEX = """//VTK::System::Dec
-in vec4 ndCoordIn;
-in vec2 texCoordIn;
-out vec2 texCoord;
-void main() { gl_Position = ndCoordIn; texCoord = texCoordIn; }
-"""
-_FRAGMENT = """//VTK::System::Dec
-//VTK::Output::Dec
-in vec2 texCoord;
-uniform sampler2D picture;
-void main() { gl_FragData[0] = texelFetch(picture, ivec2(texCoord * vec2(textureSize(picture, 0))), 0); }
-"""
 # Frames a second that a window wants while it is dragged, and no still one does.
 _DRAGGED = 1.0
 
 
-def add_volume(renderer, grid, scalars=None, **options):
-    """Add a volume to a vtkRenderer.
+def add_volume(renderer: vtkRenderer, grid: Any, scalars: Optional[str] = None, **options: Any) -> Volume:
+    """Add a volume to a renderer.
 
     Parameters
     ----------
     renderer : vtkRenderer
+        Of any window that draws by OpenGL.
     grid : grid of VTK or PyVista
-        Followed when it is modified.
+        As of :class:`Volume`; followed when it is modified.
     scalars : str, optional
         The array to draw; the active one by default.
     **options
@@ -64,6 +63,18 @@ def add_volume(renderer, grid, scalars=None, **options):
     -------
     Volume
         A vtkVolume: it can be moved, hidden and removed.
+
+    Raises
+    ------
+    Error
+        If the grid or the array cannot be drawn.
+
+    Examples
+    --------
+    >>> from vtkmodules.vtkRenderingCore import vtkRenderer
+    >>> renderer = vtkRenderer()
+    >>> volume = halite.vtk.add_volume(renderer, grid, transfer=halite.TransferFunction("magma", (0, 1)))
+    >>> renderer.RemoveVolume(volume)
     """
     volume = Volume(grid, scalars, **options)
     volume.add_to(renderer)
@@ -73,41 +84,74 @@ def add_volume(renderer, grid, scalars=None, **options):
 class Volume(vtkVolume):
     """A vtkVolume that shows a grid by Halite.
 
+    Its matrix, visibility, bounds and clipping planes (of its mapper) are VTK's. Whoever picks gets what lies behind it.
+
     Parameters
     ----------
-    grid : vtkUnstructuredGrid, vtkStructuredGrid, vtkImageData, vtkRectilinearGrid, or PyVista's classes of them
+    grid : vtkUnstructuredGrid, vtkStructuredGrid, vtkImageData or vtkRectilinearGrid
+        Or one of PyVista's classes of them. Values that are written in place are seen after ``Modified()`` of their array: they alone
+        are taken again, without the mesh.
     scalars : str, optional
+        The array to draw; the active one by default.
     transfer : halite.TransferFunction, optional
+        Colours and opacities.
     association : {"point", "cell"}, optional
+        Whether the array belongs to points or cells; points are searched first.
     component : int or "all", optional
+        As of :class:`halite.Renderer`.
     maximum : bool
         Show the largest value along each ray.
     coarse : int
-        Pixels that are one while the window is dragged.
-    threads, device, engine
+        So many pixels are one, along each side, while the window is dragged: where it wants more than a frame a second.
+    threads, device, engine, integral, reconstruction, sampling, gradient_array
         As of :class:`halite.Renderer`.
+
+    Raises
+    ------
+    Error
+        If the grid or the array cannot be drawn.
 
     Attributes
     ----------
-    transfer : halite.TransferFunction
-        May be set.
-    error : Exception or None
-        What the last frame failed with. VTK prints exceptions of observers, and goes on.
+    grid, scalars, association, component, maximum, coarse
+        As given; they may be set.
+    error : BaseException or None
+        What the last frame failed with.
     seconds : dict
-        What the last frame took: "read" depths, "draw", "composite".
+        What the last frame took, in seconds: "read" depths, "draw", "composite".
+    frames : int
+        How many pictures were drawn. A still frame costs none.
+
+    Examples
+    --------
+    >>> volume = halite.vtk.Volume(grid, "pressure", transfer=halite.TransferFunction("viridis", (0, 1), opacity=[0, 1]))
+    >>> volume.GetBounds()
+    (0.0, 1.0, 0.0, 1.0, 0.0, 1.0)
     """
 
-    def __init__(self, grid, scalars=None, *, transfer=None, association=None, component=None, maximum=False, coarse=2,
-                 threads=0, device="auto", engine="auto"):
+    def __init__(self, grid: Any, scalars: Optional[str] = None, *, transfer: Optional[TransferFunction] = None,
+                 association: Optional[str] = None, component: Any = None, maximum: bool = False, coarse: int = 2, threads: int = 0,
+                 device: str = "auto", engine: str = "auto", integral: Any = None, reconstruction: Optional[str] = None,
+                 sampling: Optional[float] = None, gradient_array: Optional[str] = None) -> None:
         self.grid, self.scalars, self.association, self.component = grid, scalars, association, component
-        self.maximum, self.coarse, self.error, self.seconds, self.frames = maximum, int(coarse), None, {}, 0
-        self._transfer, self._options = transfer, {"threads": threads, "device": device, "engine": engine}
-        self._renderer = self._shape = self._values = self._drawn = None
-        self._now, self._watched, self._late = None, {}, set()
+        self.maximum, self.coarse, self.frames = maximum, int(coarse), 0
+        self.error: Optional[BaseException] = None
+        self.seconds: dict[str, float] = {}
+        self._transfer, self._second = transfer, gradient_array
+        self._options = {"threads": threads, "device": device, "engine": engine, "integral": integral,
+                         "reconstruction": reconstruction, "sampling": sampling}
+        self._renderer: Any = None
+        self._shape: Any = None
+        self._values: Any = None
+        self._drawn: Any = None
+        self._now: Any = None
+        self._turning: Any = None
+        self._watched: dict[Any, tuple[int, int]] = {}
+        self._late: set[Any] = set()
         self._image = vtkImageData()
         self._image.SetDimensions(2, 2, 2)
         self._image.AllocateScalars(3, 1)
-        vtk_to_numpy(self._image.GetPointData().GetScalars())[:] = 0
+        self._image.GetPointData().GetScalars().Fill(0)
         mapper = vtkFixedPointVolumeRayCastMapper()
         mapper.SetInputData(self._image)
         mapper.IntermixIntersectingGeometryOff()
@@ -123,42 +167,57 @@ class Volume(vtkVolume):
         self.GetProperty().SetScalarOpacity(nothing)
         self.GetProperty().ShadeOff()
         self.SetMapper(mapper)
-        self._turning = None
         self._hold(True)
         self._follow()
 
     @property
-    def transfer(self):
+    def transfer(self) -> Optional[TransferFunction]:
+        """The transfer function; it may be set."""
         return self._transfer
 
     @transfer.setter
-    def transfer(self, transfer):
+    def transfer(self, transfer: Optional[TransferFunction]) -> None:
         self._transfer, self._drawn = transfer, None
         self._renderer.set_transfer(transfer)
 
     @property
-    def mesh(self):
-        """The halite.Mesh that is drawn."""
-        return self._renderer.mesh
+    def mesh(self) -> Mesh:
+        """The mesh that is drawn."""
+        mesh: Mesh = self._renderer.mesh
+        return mesh
 
     @property
-    def stats(self):
-        """What the last picture was drawn with and took; see halite.Renderer."""
-        return self._renderer.stats
+    def stats(self) -> dict[str, Any]:
+        """What the last picture was drawn with and took; see :attr:`halite.Renderer.stats`."""
+        stats: dict[str, Any] = self._renderer.stats
+        return stats
 
-    def add_to(self, renderer):
-        """Adds the volume to a renderer of VTK, also once more: the renderer then keeps it until it is removed."""
+    def add_to(self, renderer: vtkRenderer) -> None:
+        """Add the volume to a renderer of VTK, also once more: the renderer then keeps it until it is removed.
+
+        Parameters
+        ----------
+        renderer : vtkRenderer
+            Another one, or the same after a removal.
+
+        Examples
+        --------
+        >>> from vtkmodules.vtkRenderingCore import vtkRenderer
+        >>> left, right = vtkRenderer(), vtkRenderer()
+        >>> volume = halite.vtk.add_volume(left, grid)
+        >>> volume.add_to(right)
+        """
         self._hold(True)
         self._watch(renderer)
         renderer.AddViewProp(self)
 
-    def _follow(self):
+    def _follow(self) -> None:
         """Brings what changed of the grid, its array and the matrix to the renderer."""
         grid = self.grid
         parts = [grid.GetPoints() if hasattr(grid, "GetPoints") else None]
         if grid.IsA("vtkUnstructuredGrid"):
             parts += [grid.GetCells(), cell_types(grid)]
-        matrix = _rows(self.GetMatrix())
+        matrix = rows(self.GetMatrix())
         placed = tuple(matrix.ravel())
         shape = (id(grid), tuple(p.GetMTime() for p in parts if p is not None and hasattr(p, "GetMTime")), placed,
                  grid.GetNumberOfPoints(), grid.GetNumberOfCells(), _frame_of(grid))
@@ -166,10 +225,10 @@ class Volume(vtkVolume):
         stamp = (None if values is None else (values.__this__, values.GetMTime()), self.scalars, self.association, self.component)
         if shape == self._shape and stamp == self._values:
             return
-        what = {"association": self.association, "component": self.component}
+        what = {"association": self.association, "component": self.component, "gradient_array": self._second}
         if shape == self._shape and values is not None:
             what["association"] = "cell" if self._of_cells else "point"
-            self._renderer.set_scalars(vtk_to_numpy(values), **what)
+            self._renderer.set_scalars(_support.vtk_to_numpy(values), **what)
         else:
             mesh = Mesh.from_vtk(grid)
             if self._renderer is None:
@@ -182,7 +241,7 @@ class Volume(vtkVolume):
             self._image.Modified()
         self._shape, self._values, self._drawn = shape, stamp, None
 
-    def _array(self):
+    def _array(self) -> Any:
         """The array of the grid that is drawn."""
         kinds = [("point", self.grid.GetPointData()), ("cell", self.grid.GetCellData())]
         for kind, data in kinds:
@@ -193,9 +252,10 @@ class Volume(vtkVolume):
                     return found
         return None
 
-    def _hold(self, strongly):
+    def _hold(self, strongly: bool) -> None:
         """Has the mapper say when it is its turn. Strongly, the mapper keeps this object alive, which it belongs to."""
-        mapper, turn = self.GetMapper(), self._turn
+        mapper: Any = self.GetMapper()
+        turn: Any = self._turn
         if self._turning is not None:
             was, observer = self._turning
             if was == strongly:
@@ -204,14 +264,14 @@ class Volume(vtkVolume):
         if not strongly:
             method = weakref.WeakMethod(self._turn)
 
-            def turn(*event):
+            def turn(*event: Any) -> None:
                 alive = method()
                 if alive is not None:
                     alive(*event)
 
         self._turning = (strongly, mapper.AddObserver("VolumeMapperRenderStartEvent", turn))
 
-    def _leave(self, renderer):
+    def _leave(self, renderer: Any) -> None:
         """Lets go of a renderer that the volume was removed from; of no more use to any, it lives while somebody has it."""
         for observer in self._watched.pop(renderer, ()):
             renderer.RemoveObserver(observer)
@@ -219,33 +279,36 @@ class Volume(vtkVolume):
         if not self._watched:
             self._hold(False)
 
-    def _watch(self, renderer):
+    def _watch(self, renderer: Any) -> None:
         if renderer not in self._watched:
             start = renderer.AddObserver("StartEvent", self._start)
             self._watched[renderer] = (start, renderer.AddObserver("EndEvent", self._end))
+        if renderer.GetRenderWindow() is not None:
+            Frames.of(renderer.GetRenderWindow())
 
-    def _start(self, renderer, _):
+    def _start(self, renderer: Any, _: str) -> None:
         if not renderer.HasViewProp(self):
             self._leave(renderer)
             return
         self._now = renderer
+        Frames.of(renderer.GetRenderWindow())
         peels = renderer.GetUseDepthPeeling() and renderer.GetUseDepthPeelingForVolumes()
         if peels and self.GetVisibility() and renderer.HasViewProp(self):
             # The carrier has nothing that could be peeled: it is drawn over what was.
             self.VisibilityOff()
             self._late.add(renderer)
 
-    def _end(self, renderer, _):
+    def _end(self, renderer: Any, _: str) -> None:
         self._now = None
         if renderer in self._late:
             self._late.discard(renderer)
             self.VisibilityOn()
             self._paint(renderer)
 
-    def _renderer_of_now(self):
+    def _renderer_of_now(self) -> Any:
         if self._now is not None:
             return self._now
-        all_of = [c for c in (self.GetConsumer(i) for i in range(self.GetNumberOfConsumers())) if isinstance(c, vtkRenderer)]
+        all_of: list[Any] = [c for c in (self.GetConsumer(i) for i in range(self.GetNumberOfConsumers())) if isinstance(c, vtkRenderer)]
         for renderer in all_of:
             self._watch(renderer)
         if len(all_of) == 1:
@@ -255,32 +318,35 @@ class Volume(vtkVolume):
             if renderer.GetRenderWindow() is not None:
                 viewport = [0] * 4
                 renderer.GetRenderWindow().GetState().vtkglGetIntegerv(_VIEWPORT, viewport)
-                width, height, x, y = _area(renderer)
+                width, height, x, y = area(renderer)
                 if viewport == [x, y, width, height]:
                     return renderer
         return None
 
-    def _turn(self, *_):
+    def _turn(self, *_: Any) -> None:
         self._hold(True)
         renderer = self._renderer_of_now()
         # Whoever picks gets what lies behind.
         if renderer is not None and renderer.GetSelector() is None:
             self._paint(renderer)
 
-    def _paint(self, renderer):
-        self.error = None
+    def _paint(self, renderer: Any) -> None:
+        before, self.error = self.error, None
         try:
             self._draw(renderer)
-        except Exception as error:
+        except BaseException as error:
             self.error = error
-            raise
+            Frames.of(renderer.GetRenderWindow()).failed(error, repr(error) != repr(before))
 
-    def _draw(self, renderer):
+    def _draw(self, renderer: Any) -> None:
         began = time.perf_counter()
+        if _is_occluded(renderer):
+            raise Error("VTK's ambient occlusion (SSAO) does not know volumes of Halite: disable it (PyVista: disable_ssao)")
         self._follow()
-        window, camera = renderer.GetRenderWindow(), renderer.GetActiveCamera()
+        window: Any = renderer.GetRenderWindow()
+        camera = renderer.GetActiveCamera()
         state = window.GetState()
-        width, height, x, y = _area(renderer)
+        width, height, x, y = area(renderer)
         bound = [0]
         state.vtkglGetIntegerv(_DRAW_FRAMEBUFFER, bound)
         is_foreign = bound[0] != window.GetRenderFramebuffer().GetFBOIndex()
@@ -292,10 +358,10 @@ class Volume(vtkVolume):
             return
         state.Push()
         try:
-            depth = _depths(window, is_foreign, x, y, width, height)
+            depth = depths(window, is_foreign, x, y, width, height)
             read = time.perf_counter()
-            to_eye = _rows(camera.GetModelViewTransformMatrix())
-            to_clip = _rows(camera.GetProjectionTransformMatrix(renderer.GetTiledAspectRatio(), -1, 1))
+            to_eye = rows(camera.GetModelViewTransformMatrix())
+            to_clip = rows(camera.GetProjectionTransformMatrix(renderer.GetTiledAspectRatio(), -1, 1))
             step = self.coarse if window.GetDesiredUpdateRate() > _DRAGGED and self.coarse > 1 else 1
             picture = self._picture(to_eye, to_clip, depth, step)
             drawn = time.perf_counter()
@@ -306,15 +372,15 @@ class Volume(vtkVolume):
             state.vtkglBlendEquation(_FUNC_ADD)
             state.vtkglBlendFuncSeparate(_ONE, _ONE_MINUS_SRC_ALPHA, _ONE, _ONE_MINUS_SRC_ALPHA)
             if is_foreign or step > 1:
-                _composite(window, state, picture, x, y, width, height)
+                composite(window, state, picture, x, y, width, height)
             else:
-                window.SetRGBAPixelData(x, y, x + width - 1, y + height - 1, numpy_to_vtk(picture.reshape(-1)), 0, 1)
+                window.SetRGBAPixelData(x, y, x + width - 1, y + height - 1, _support.numpy_to_vtk(picture.reshape(-1)), 0, 1)
         finally:
             state.Pop()
         ended = time.perf_counter()
         self.seconds = {"read": read - began, "draw": drawn - read, "composite": ended - drawn}
 
-    def _picture(self, to_eye, to_clip, depth, step):
+    def _picture(self, to_eye: Any, to_clip: Any, depth: Any, step: int) -> Any:
         """The picture, row 0 lowest; the last one, if nothing that it depends on changed."""
         height, width = depth.shape
         planes = self.GetMapper().GetClippingPlanes()
@@ -336,51 +402,19 @@ class Volume(vtkVolume):
         return picture
 
 
-def _rows(matrix):
-    return np.array([[matrix.GetElement(i, j) for j in range(4)] for i in range(4)])
+def _is_occluded(renderer: Any) -> bool:
+    """Whether the renderer draws by a pass of ambient occlusion."""
+    if renderer.GetUseSSAO():
+        return True
+    found = renderer.GetPass()
+    while found is not None and not found.IsA("vtkSSAOPass"):
+        found = found.GetDelegatePass() if hasattr(found, "GetDelegatePass") else None
+    return found is not None
 
 
-def _frame_of(grid):
+def _frame_of(grid: Any) -> Any:
     """Where an image is."""
     if not grid.IsA("vtkImageData"):
         return None
     matrix = grid.GetDirectionMatrix()
     return (grid.GetOrigin(), grid.GetSpacing(), grid.GetExtent(), tuple(matrix.GetElement(i, j) for i in range(3) for j in range(3)))
-
-
-def _area(renderer):
-    """Width, height and lower left corner of a renderer, in pixels."""
-    numbers = [[0] for _ in range(4)]
-    renderer.GetTiledSizeAndOrigin(*numbers)
-    return [n[0] for n in numbers]
-
-
-def _depths(window, is_foreign, x, y, width, height):
-    """Window depths, row 0 lowest."""
-    if is_foreign:
-        framebuffer = vtkOpenGLFramebufferObject()
-        framebuffer.SetContext(window)
-        buffer = framebuffer.DownloadDepth((x, x + width - 1, y, y + height - 1), _FLOAT)
-        depth = np.empty((height, width), np.float32)
-        buffer.Download2D(_FLOAT, depth, (width, height), 1, (0, 0))
-        if buffer.GetReferenceCount() > 1:
-            buffer.UnRegister(None)
-        return depth
-    values = vtkFloatArray()
-    window.GetZbufferData(x, y, x + width - 1, y + height - 1, values)
-    return vtk_to_numpy(values).reshape(height, width).copy()
-
-
-def _composite(window, state, picture, x, y, width, height):
-    """Draws a picture over an area of whatever framebuffer is bound, enlarged if it is smaller."""
-    texture = vtkTextureObject()
-    texture.SetContext(window)
-    texture.Create2DFromRaw(picture.shape[1], picture.shape[0], 4, _FLOAT, picture)
-    quad = vtkOpenGLQuadHelper(window, _VERTEX, _FRAGMENT, "")
-    state.vtkglViewport(x, y, width, height)
-    texture.Activate()
-    window.GetShaderCache().ReadyShaderProgram(_VERTEX, _FRAGMENT, "").SetUniformi("picture", texture.GetTextureUnit())
-    quad.Render()
-    texture.Deactivate()
-    quad.ReleaseGraphicsResources(window)
-    texture.ReleaseGraphicsResources(window)

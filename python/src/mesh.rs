@@ -6,7 +6,7 @@ use halite::grid::{Grid, Lattice};
 use halite::io::{DataSet, Source, Time};
 use halite::memory;
 use halite::mesh::{Array, Arrays, Cells, Polyhedra, Values};
-use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{Element, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 
@@ -34,28 +34,29 @@ impl Mesh {
         py.detach(read).map(Mesh).map_err(raised)
     }
 
+    /// Arrays are read where they are, and each is copied once, into the core's own form.
     #[staticmethod]
     fn from_arrays(
-        points: PyReadonlyArray2<'_, f64>,
-        connectivity: PyReadonlyArray1<'_, i64>,
-        offsets: PyReadonlyArray1<'_, i64>,
-        types: PyReadonlyArray1<'_, u8>,
-        polyhedra: Option<[PyReadonlyArray1<'_, i64>; 3]>,
+        points: &Bound<'_, PyAny>,
+        connectivity: &Bound<'_, PyAny>,
+        offsets: &Bound<'_, PyAny>,
+        types: &Bound<'_, PyAny>,
+        polyhedra: Option<[Bound<'_, PyAny>; 3]>,
         point_data: Vec<Given<'_>>,
         cell_data: Vec<Given<'_>>,
     ) -> PyResult<Self> {
         let cells = Cells {
-            types: memory::copied("types of cells", types.as_slice()?).map_err(raised)?,
-            offsets: counts("offsets", &offsets)?,
-            connectivity: indices(&connectivity)?,
+            types: whole("types", types, |n| format!("types are VTK's, from 0 to 255, and not {n}"))?,
+            offsets: counts("offsets", offsets)?,
+            connectivity: indices("cells", connectivity)?,
         };
         let (of_points, of_cells) = (arrays(point_data)?, arrays(cell_data)?);
-        let mut mesh = halite::mesh::Mesh::new(triples(&points)?, cells, of_points, of_cells).map_err(raised)?;
+        let mut mesh = halite::mesh::Mesh::new(triples(points)?, cells, of_points, of_cells).map_err(raised)?;
         if let Some([cells, faces, points]) = polyhedra {
             let polyhedra = Polyhedra {
                 cells: counts("faces of cells", &cells)?,
                 faces: counts("points of faces", &faces)?,
-                points: indices(&points)?,
+                points: indices("faces", &points)?,
             };
             mesh.set_polyhedra(polyhedra).map_err(raised)?;
         }
@@ -169,39 +170,66 @@ fn hull(points: impl Iterator<Item = DVec3>) -> [DVec3; 2] {
     points.filter(|p| p.is_finite()).fold(none, |[low, high], p| [low.min(p), high.max(p)])
 }
 
-fn triples(points: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<DVec3>> {
-    if points.shape()[1] != 3 {
-        let [n, k] = [points.shape()[0], points.shape()[1]];
-        return Err(Error::new_err(format!("points have the shape ({n}, {k}), and not (n, 3)")));
+/// Points of an array of shape (n, 3), of doubles or floats.
+fn triples(given: &Bound<'_, PyAny>) -> PyResult<Vec<DVec3>> {
+    fn of<T: Element + Copy + Into<f64>>(given: &PyReadonlyArrayDyn<'_, T>) -> PyResult<Vec<DVec3>> {
+        let &[n, 3] = given.shape() else {
+            let what = format!("points have the shape {}, and not (n, 3)", shape(given.shape()));
+            return Err(Error::new_err(what));
+        };
+        let mut points = vec![];
+        memory::reserve("points", &mut points, n).map_err(raised)?;
+        let (triples, _) = given.as_slice()?.as_chunks();
+        points.extend(triples.iter().map(|p: &[T; 3]| DVec3::from_array(p.map(Into::into))));
+        Ok(points)
     }
-    let given = points.as_slice()?.as_chunks().0;
-    let mut points = vec![];
-    memory::reserve("points", &mut points, given.len()).map_err(raised)?;
-    points.extend(given.iter().map(|&p| DVec3::from_array(p)));
-    Ok(points)
+    if let Ok(points) = given.cast::<PyArrayDyn<f64>>() {
+        return of(&points.try_readonly()?);
+    }
+    match given.cast::<PyArrayDyn<f32>>() {
+        Ok(points) => of(&points.try_readonly()?),
+        Err(_) => Err(Error::new_err("points are neither doubles nor floats")),
+    }
 }
 
-fn counts(what: &str, numbers: &PyReadonlyArray1<'_, i64>) -> PyResult<Vec<u64>> {
+/// A shape as Python writes it.
+pub(crate) fn shape(lengths: &[usize]) -> String {
+    match lengths {
+        [n] => format!("({n},)"),
+        _ => format!("({})", lengths.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")),
+    }
+}
+
+fn counts(what: &str, numbers: &Bound<'_, PyAny>) -> PyResult<Vec<u64>> {
     whole(what, numbers, |n| format!("{what}: {n} is negative"))
 }
 
-fn indices(numbers: &PyReadonlyArray1<'_, i64>) -> PyResult<Vec<u32>> {
-    whole("points of cells", numbers, |n| format!("{n} is the number of no point"))
+fn indices(what: &str, numbers: &Bound<'_, PyAny>) -> PyResult<Vec<u32>> {
+    whole(what, numbers, |n| format!("{n} is the number of no point"))
 }
 
-/// Numbers in another type, which has room for all of them.
-fn whole<T: TryFrom<i64>>(
-    what: &str,
-    numbers: &PyReadonlyArray1<'_, i64>,
-    wrong: impl Fn(i64) -> String,
-) -> PyResult<Vec<T>> {
-    let given = numbers.as_slice()?;
-    let mut whole = vec![];
-    memory::reserve(what, &mut whole, given.len()).map_err(raised)?;
-    for &n in given {
-        whole.push(T::try_from(n).map_err(|_| Error::new_err(wrong(n)))?);
+/// Whole numbers of any type in another, which has room for all of them.
+fn whole<T>(what: &str, given: &Bound<'_, PyAny>, wrong: impl Fn(String) -> String) -> PyResult<Vec<T>>
+where
+    T: TryFrom<i64> + TryFrom<i32> + TryFrom<i16> + TryFrom<i8>,
+    T: TryFrom<u64> + TryFrom<u32> + TryFrom<u16> + TryFrom<u8>,
+{
+    macro_rules! of {
+        ($($type:ty),*) => {
+            $(if let Ok(array) = given.cast::<PyArrayDyn<$type>>() {
+                let array = array.try_readonly()?;
+                let given = array.as_slice()?;
+                let mut whole = vec![];
+                memory::reserve(what, &mut whole, given.len()).map_err(raised)?;
+                for &n in given {
+                    whole.push(T::try_from(n).map_err(|_| Error::new_err(wrong(n.to_string())))?);
+                }
+                return Ok(whole);
+            })*
+        };
     }
-    Ok(whole)
+    of!(i64, i32, u8, u32, u64, i16, u16, i8);
+    Err(Error::new_err(format!("{what} are no whole numbers of 8 to 64 bits")))
 }
 
 fn arrays(given: Vec<Given<'_>>) -> PyResult<Vec<Array>> {

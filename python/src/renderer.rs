@@ -9,11 +9,12 @@ use halite::host::{Log, Session};
 use halite::image::{Backdrop, Image};
 use halite::io::DataSet;
 use halite::mesh::cells::Tetrahedra;
+use halite::project::Switches;
 use halite::scene::{self, Scalars};
-use halite::view::{DepthBuffer, DepthKind};
 use numpy::{IntoPyArray, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
+use serde_json::Value;
 use std::path::PathBuf;
 use std::sync::Mutex;
 
@@ -80,14 +81,66 @@ impl Renderer {
         })
     }
 
-    fn set_array(&self, py: Python<'_>, mesh: &Mesh, name: &str, of_cells: bool, code: i64) -> PyResult<()> {
-        let array = mesh.array(name, of_cells)?;
-        self.with(py, |s| s.set_field(|| Field::from_array(array, association(of_cells), component(code))))
+    /// Draws an array of the mesh by its name, or values; with a second variable, likewise.
+    fn set_field(
+        &self,
+        py: Python<'_>,
+        mesh: &Mesh,
+        values: &Bound<'_, PyAny>,
+        of_cells: bool,
+        code: i64,
+        second: Option<Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let (own, other);
+        let first = match values.extract::<String>() {
+            Ok(name) => mesh.array(&name, of_cells)?,
+            Err(_) => {
+                own = array("values".into(), values)?;
+                &own
+            }
+        };
+        let second = match &second {
+            None => None,
+            Some(second) => match second.extract::<String>() {
+                Ok(name) => Some(mesh.array(&name, of_cells)?),
+                Err(_) => {
+                    other = array("gradient_array".into(), second)?;
+                    Some(&other)
+                }
+            },
+        };
+        let field = || {
+            let field = Field::from_array(first, association(of_cells), component(code))?;
+            let Some(second) = second else { return Ok(field) };
+            let part = if second.components == 1 { Component::Index(0) } else { Component::Magnitude };
+            field.with_second(Field::from_array(second, association(of_cells), part)?)
+        };
+        self.with(py, |session| session.set_field(field))
     }
 
-    fn set_values(&self, py: Python<'_>, values: &Bound<'_, PyAny>, of_cells: bool, code: i64) -> PyResult<()> {
-        let array = array("values".into(), values)?;
-        self.with(py, |s| s.set_field(|| Field::from_array(&array, association(of_cells), component(code))))
+    /// How rays are integrated, how grids are rebuilt along them, and the projection's switches; the first and the last are texts
+    /// of JSON, as scenes have them.
+    fn set_options(
+        &self,
+        py: Python<'_>,
+        integral: Option<&str>,
+        reconstruction: &str,
+        sampling: f64,
+        projection: Option<&str>,
+    ) -> PyResult<()> {
+        fn parsed<T>(what: &str, text: &str, read: impl Fn(&Value) -> Result<T, String>) -> PyResult<T> {
+            let value = serde_json::from_str(text).map_err(|e| e.to_string());
+            value.and_then(|v| read(&v)).map_err(|e| Error::new_err(format!("{what}: {e}")))
+        }
+        let integral = integral.map(|text| parsed("integral", text, scene::integral)).transpose()?;
+        let projection = projection.map(|text| parsed("projection", text, scene::read::<Switches>)).transpose()?;
+        self.with(py, |session| {
+            session.set_reconstruction(reconstruction, sampling)?;
+            if let Some(switches) = projection {
+                session.set_switches(switches);
+            }
+            integral.map_or(Ok(()), |choice| session.set_integral(choice))
+        })
     }
 
     fn set_transfer(&self, py: Python<'_>, transfer: &TransferFunction) -> PyResult<()> {
@@ -103,21 +156,11 @@ impl Renderer {
         py: Python<'py>,
         view: &View,
         depth: Option<PyReadonlyArray2<'py, f32>>,
+        kind: &str,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Option<Bound<'py, PyArray3<f32>>>> {
-        let mut view = view.0.clone();
+        let view = view.ended(depth, kind)?;
         let [w, h] = view.size().map(|n| n as usize);
-        if let Some(depth) = depth {
-            if depth.shape() != [h, w] {
-                let [rows, columns] = [depth.shape()[0], depth.shape()[1]];
-                return Err(Error::new_err(format!(
-                    "depth has the shape ({rows}, {columns}), and the view ({h}, {w})"
-                )));
-            }
-            // The far plane ends nothing that the clipping range does not end.
-            let values = depth.as_slice()?.iter().map(|&d| if d < 1.0 { f64::from(d) } else { 1.0 }).collect();
-            view = view.with_depth(DepthBuffer { kind: DepthKind::Window, values }).map_err(raised)?;
-        }
         let mut thrown: Option<PyErr> = None;
         let image = {
             let thrown = &mut thrown;
@@ -183,22 +226,31 @@ pub(crate) fn automatic(
         Ok((scene.scalars, field.association() == Association::Cell, view, scene.transfer))
     });
     let (scalars, of_cells, view, transfer) = chosen.map_err(raised)?;
-    Ok((scalars.name, of_cells, View(view), TransferFunction(transfer)))
+    Ok((scalars.name, of_cells, View { view, opaque: vec![] }, TransferFunction(transfer)))
 }
 
-/// A picture as the bytes of a .png, .exr or .npy file, or written to one.
+/// A picture as the bytes of a .png, or written to a .png, .exr or .npy file; over a colour, or one for each pixel.
 #[pyfunction]
 pub(crate) fn encode<'py>(
     py: Python<'py>,
     pixels: PyReadonlyArray3<'py, f32>,
     background: Option<[f32; 3]>,
+    behind: Option<PyReadonlyArray3<'py, f32>>,
     path: Option<PathBuf>,
 ) -> PyResult<Bound<'py, PyBytes>> {
     let &[h, w, 4] = pixels.shape() else {
         return Err(Error::new_err("a picture has the shape (height, width, 4)"));
     };
     let image = Image { size: [w as u32, h as u32], pixels: pixels.as_slice()?.as_chunks().0.to_vec() };
-    let backdrop = background.map_or(Backdrop::Transparent, Backdrop::Color);
+    let backdrop = match (&behind, background) {
+        (Some(behind), _) if behind.shape() == [h, w, 3] => Backdrop::Pixels(behind.as_slice()?.as_chunks().0),
+        (Some(_), _) => {
+            let what = format!("a background is a colour, or has the shape of the picture, ({h}, {w}, 3)");
+            return Err(Error::new_err(what));
+        }
+        (None, Some(color)) => Backdrop::Color(color),
+        (None, None) => Backdrop::Transparent,
+    };
     let bytes = match path {
         Some(path) => image.save(&path, backdrop).map(|()| vec![]),
         None => image.encode("png", backdrop),

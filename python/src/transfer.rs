@@ -1,18 +1,24 @@
 //! Transfer functions.
 
+use crate::mesh::shape;
 use crate::{Error, raised};
-use halite::scene::widget;
+use halite::scene::look;
+use halite::transfer::bivariate::{Source, Table};
 use halite::transfer::colormap::ColorMap;
-use halite::transfer::shading::{Shade, Shading};
-use halite::transfer::{Bivariate, Convention, Emission};
+use halite::transfer::{Convention, Emission};
+use numpy::{PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 /// Colour and opacity of a scalar; it never changes.
 #[pyclass(module = "halite._halite", frozen)]
 pub(crate) struct TransferFunction(pub(crate) halite::transfer::TransferFunction);
 
+/// Texels of shape (rows over g, columns over s, 4), and the ranges of s and g.
+type Texels<'py> = (PyReadonlyArray3<'py, f64>, [[f64; 2]; 2]);
+
 #[pymethods]
 impl TransferFunction {
+    /// `second` is a text of JSON: what scenes have of widgets, gradient opacity, silhouettes, light and lights.
     #[new]
     #[allow(clippy::too_many_arguments, reason = "all have names in Python")]
     fn new(
@@ -21,10 +27,9 @@ impl TransferFunction {
         unit_distance: f64,
         convention: &str,
         emission_scale: Option<f64>,
-        gradient_opacity: Vec<[f64; 2]>,
-        widgets: Vec<String>,
-        silhouette: Option<f64>,
-        shade: Option<[f64; 4]>,
+        clamp: bool,
+        second: &str,
+        table: Option<Texels<'_>>,
     ) -> PyResult<Self> {
         let convention = match convention {
             "extinction" => Convention::Extinction,
@@ -35,33 +40,24 @@ impl TransferFunction {
                 return Err(Error::new_err(what));
             }
         };
-        let mut two = Bivariate::default();
-        if !gradient_opacity.is_empty() {
-            let knots = gradient_opacity.into_iter().map(|[g, h]| (g, h)).collect();
-            two = two.with_gradient_opacity(knots).map_err(raised)?;
+        let value = serde_json::from_str(second).map_err(|e| Error::new_err(e.to_string()))?;
+        let (mut two, shading) = look(&value).map_err(raised)?;
+        if let Some((texels, ranges)) = table {
+            let &[rows, columns, 4] = texels.shape() else {
+                let what = format!("a table has the shape (rows, columns, 4), and not {}", shape(texels.shape()));
+                return Err(Error::new_err(what));
+            };
+            let texels = texels.as_slice()?.as_chunks().0.to_vec();
+            two = two.with_table(Table::new([columns, rows], texels, ranges).map_err(raised)?);
         }
-        let function = if widgets.is_empty() {
+        let function = if *two.source() == Source::Scalar {
             let color = color.into_iter().map(|[s, r, g, b]| (s, [r, g, b])).collect();
             let opacity = opacity.into_iter().map(|[s, a]| (s, a)).collect();
             halite::transfer::TransferFunction::new(color, opacity, unit_distance).map_err(raised)?.with_bivariate(two)
         } else {
-            let read = |(i, text): (usize, &String)| {
-                let value = serde_json::from_str(text).map_err(|e| e.to_string());
-                value.and_then(|v| widget(&v)).map_err(|e| Error::new_err(format!("widgets[{i}]: {e}")))
-            };
-            let widgets = widgets.iter().enumerate().map(read).collect::<PyResult<_>>()?;
-            let two = two.with_widgets(widgets).map_err(raised)?;
             halite::transfer::TransferFunction::of_two(two, unit_distance).map_err(raised)?
         };
-        let mut shading = Shading::default();
-        if let Some(p) = silhouette {
-            shading = shading.with_silhouette(p).map_err(raised)?;
-        }
-        if let Some([ambient, diffuse, specular, power]) = shade {
-            let shade = Shade { ambient, diffuse, specular, power, ..Shade::default() };
-            shading = shading.with_lights(shade, vec![Default::default()]).map_err(raised)?;
-        }
-        let mut function = function.with_convention(convention).with_shading(shading);
+        let mut function = function.with_convention(convention).with_clamp(clamp).with_shading(shading);
         if let Some(scale) = emission_scale {
             function = function.with_emission(Emission::Direct { scale }).map_err(raised)?;
         }

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """Meshes, functions, views and pictures, without VTK."""
-import doctest
 import gc
 import os
 import pickle
@@ -13,11 +12,6 @@ import pytest
 
 import halite
 from conftest import chord, lattice, look_at, perspective, resident
-
-
-def test_examples_run():
-    failed, tried = doctest.testmod(halite)
-    assert failed == 0 and tried > 5
 
 
 def test_pictures_are_the_integral(box, fog):

@@ -8,102 +8,13 @@ import pytest
 
 pytest.importorskip("vtkmodules")
 
-from vtkmodules import vtkCommonCore, vtkCommonDataModel, vtkFiltersSources, vtkRenderingCore  # noqa: E402
+from vtkmodules import vtkCommonCore, vtkCommonDataModel, vtkRenderingCore  # noqa: E402
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy  # noqa: E402
 
 import halite  # noqa: E402
 import halite.vtk  # noqa: E402
 from conftest import chord, lattice, resident  # noqa: E402
-
-SIZE = (120, 90)
-NEAR = 1.1
-
-
-def grid(values=None, size=2):
-    points, cells, offsets, types = lattice(size)
-    g = vtkCommonDataModel.vtkUnstructuredGrid()
-    p = vtkCommonCore.vtkPoints()
-    p.SetData(numpy_to_vtk(points, deep=1))
-    g.SetPoints(p)
-    g.Allocate(len(types))
-    for c, kind in enumerate(types):
-        g.InsertNextCell(int(kind), 8, [int(i) for i in cells[8 * c:8 * c + 8]])
-    a = numpy_to_vtk(np.ones(len(points)) if values is None else values, deep=1)
-    a.SetName("s")
-    g.GetPointData().SetScalars(a)
-    return g
-
-
-def window(*renderers, samples=0, size=SIZE):
-    w = vtkRenderingCore.vtkRenderWindow()
-    w.SetOffScreenRendering(1)
-    w.SetMultiSamples(samples)
-    w.SetAlphaBitPlanes(1)
-    w.SetSize(*size)
-    for r in renderers:
-        w.AddRenderer(r)
-    return w
-
-
-def renderer(background=(0, 0, 0), viewport=(0, 0, 1, 1)):
-    r = vtkRenderingCore.vtkRenderer()
-    r.SetBackground(*background)
-    r.SetViewport(*viewport)
-    c = r.GetActiveCamera()
-    c.SetPosition(3, -2.5, 2)
-    c.SetViewUp(0, 0, 1)
-    return r
-
-
-def plane(distance, color=(0.2, 0.4, 0.8)):
-    """An opaque square that looks at the camera, so far from the origin towards it."""
-    s = vtkFiltersSources.vtkPlaneSource()
-    s.SetOrigin(-9, -9, 0)
-    s.SetPoint1(9, -9, 0)
-    s.SetPoint2(-9, 9, 0)
-    n = np.array([3, -2.5, 2]) / np.linalg.norm([3, -2.5, 2])
-    s.SetNormal(*n)
-    s.SetCenter(*(n * distance))
-    m = vtkRenderingCore.vtkPolyDataMapper()
-    m.SetInputConnection(s.GetOutputPort())
-    a = vtkRenderingCore.vtkActor()
-    a.SetMapper(m)
-    a.GetProperty().LightingOff()
-    a.GetProperty().SetColor(*color)
-    return a
-
-
-def pixels(w, render=True):
-    if render:
-        w.Render()
-    out = vtkCommonCore.vtkUnsignedCharArray()
-    width, height = w.GetSize()
-    w.GetRGBACharPixelData(0, 0, width - 1, height - 1, 0, out)
-    return vtk_to_numpy(out).reshape(height, width, 4)[::-1].astype(float)
-
-
-def to_clip(r):
-    rows = lambda m: np.array([[m.GetElement(i, j) for j in range(4)] for i in range(4)])
-    c = r.GetActiveCamera()
-    return rows(c.GetProjectionTransformMatrix(r.GetTiledAspectRatio(), -1, 1)) @ rows(c.GetModelViewTransformMatrix())
-
-
-def over(front, back):
-    return 255 * (front[..., :3] + (1 - front[..., 3:]) * np.asarray(back))
-
-
-def depth_of(r, distance):
-    """The window depth of :func:`plane`."""
-    n = np.array([3, -2.5, 2]) / np.linalg.norm([3, -2.5, 2])
-    p = to_clip(r) @ np.append(n * distance, 1)
-    return 0.5 + 0.5 * p[2] / p[3]
-
-
-@pytest.fixture
-def fog():
-    from conftest import COLOR, K
-    return halite.TransferFunction([(0, *COLOR)], opacity=1.0, unit_distance=1 / K)
-
+from windows import NEAR, SIZE, depth_of, grid, over, pixels, plane, renderer, to_clip, window  # noqa: E402
 
 @pytest.mark.parametrize("parallel", [False, True])
 @pytest.mark.parametrize("distance", [None, -4.0, 0.0, 2.5])
@@ -244,19 +155,53 @@ def test_bounds_and_picking(fog):
     assert v.error is None
 
 
-def test_errors_are_seen_and_survived(fog):
+def test_errors_are_raised_and_survived(fog, monkeypatch):
     r, g = renderer(), grid()
     v = halite.vtk.add_volume(r, g, transfer=fog)
     w = window(r)
     good = pixels(w)
     v.scalars = "nothing"
-    g.Modified()
-    w.Render()
-    assert isinstance(v.error, halite.Error) and "nothing" in str(v.error)
+    for _ in range(2):
+        with pytest.raises(halite.Error, match='"nothing"') as raised:
+            w.Render()
+        assert v.error is raised.value
+    # Where VTK asks for frames by itself, nobody can catch it: it is shown, once.
+    shown = []
+    monkeypatch.setattr(sys, "excepthook", lambda kind, error, trace: shown.append(error))
+    shot = vtkRenderingCore.vtkWindowToImageFilter()
+    shot.SetInput(w)
+    shot.ShouldRerenderOn()
+    shot.Update()
+    shot.Modified()
+    shot.Update()
+    assert not shown, "the user knows this one"
+    v.scalars = "other"
+    for _ in range(3):
+        shot.Modified()
+        shot.Update()
+    assert len(shown) == 1 and '"other"' in str(shown[0])
     v.scalars = "s"
     assert (pixels(w) == good).all() and v.error is None
+    # Ctrl-C while a frame is drawn.
+    monkeypatch.setattr(v, "_picture", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+    with pytest.raises(KeyboardInterrupt):
+        w.Render()
+    monkeypatch.undo()
+    assert (pixels(w) == good).all()
     with pytest.raises(halite.Error, match="vtkPolyData"):
         halite.vtk.add_volume(r, vtkCommonDataModel.vtkPolyData())
+
+
+def test_ambient_occlusion_is_refused(fog):
+    r = renderer()
+    v = halite.vtk.add_volume(r, grid(), transfer=fog)
+    w = window(r)
+    good = pixels(w)
+    r.UseSSAOOn()
+    with pytest.raises(halite.Error, match="SSAO"):
+        w.Render()
+    r.UseSSAOOff()
+    assert (pixels(w) == good).all() and v.error is None
 
 
 def test_windows_come_and_go(fog):

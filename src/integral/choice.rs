@@ -36,6 +36,23 @@ pub struct Choice {
     pub two: Two,
 }
 
+impl Choice {
+    /// This choice with the form, or the method of two variables, that options and scenes know by `name`.
+    ///
+    /// # Errors
+    /// With the names that there are.
+    pub fn named(self, name: &str) -> std::result::Result<Self, String> {
+        if let Some((_, form)) = Form::ALL.into_iter().find(|f| f.0 == name) {
+            return Ok(Choice { form, ..self });
+        }
+        if let Some((_, method)) = Method::ALL.into_iter().find(|m| m.0 == name) {
+            return Ok(Choice { two: Two { method, ..self.two }, ..self });
+        }
+        let known: Vec<&str> = Form::ALL.iter().map(|f| f.0).chain(Method::ALL.iter().map(|m| m.0)).collect();
+        Err(format!("\"{name}\" is not known here; there is {}", known.join(", ")))
+    }
+}
+
 impl Default for Choice {
     fn default() -> Self {
         Choice {

@@ -230,8 +230,22 @@ impl LightJson {
     }
 }
 
+/// What a scene says of a second variable, light and silhouettes: an object with some of the keys `widgets`, `table2d`,
+/// `gradient_opacity`, `silhouette`, `shade` and `lights`. Files are relative to the working directory.
+///
+/// # Errors
+/// [`Error::Transfer`] with what is wrong, and where in the value; those of reading a table's file.
+pub fn look(value: &Value) -> Result<(Bivariate, Shading)> {
+    let second: Second = read(value).map_err(Error::Transfer)?;
+    match second.read(Path::new("")) {
+        Err(Error::Malformed { path, what }) if path.as_os_str().is_empty() => Err(Error::Transfer(what)),
+        other => other,
+    }
+}
+
 /// What a scene's file has of a second variable and light.
-#[derive(Default)]
+#[derive(Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub(super) struct Second {
     pub(super) widgets: Option<Vec<WidgetJson>>,
     pub(super) table: Option<TableJson>,
@@ -239,6 +253,7 @@ pub(super) struct Second {
     pub(super) silhouette: Option<f64>,
     pub(super) shade: Option<ShadeJson>,
     pub(super) lights: Option<Vec<LightJson>>,
+    #[serde(skip)]
     pub(super) maximum: bool,
 }
 

@@ -2,14 +2,11 @@
 
 use crate::output::misuse;
 use crate::variant::{named, table};
-use anyhow::{Result, anyhow, bail};
+use anyhow::{Result, anyhow};
 use clap::Args;
-use halite::integral::choice::{
-    Alpha, Build, Choice, Culling, Form, MOST_PIECES, Method, Planes, Texels, Two, Weights,
-};
+use halite::integral::choice::{Alpha, Build, Choice, Culling, MOST_PIECES, Planes, Texels, Two, Weights};
 use halite::integral::table::Kind;
-use halite::scene::{Scene, read};
-use serde_json::Value;
+use halite::scene::{Scene, integral};
 use std::path::Path;
 
 /// What of the integral's form somebody said.
@@ -19,7 +16,7 @@ pub(crate) struct Integral {
     /// between samples, second-order (of one length) or second-order-polynomial; with a second variable or light adaptive,
     /// analytic, or segmented
     #[arg(long, value_name = "FORM", value_parser = by_name, help_heading = "Integral")]
-    integral: Option<ByName>,
+    integral: Option<String>,
     /// Texels of the table: values in front, values behind, and lengths (volume) or planes (cylindrical)
     #[arg(long, value_name = "NxN[xN]", value_parser = table, help_heading = "Integral")]
     table: Option<[u32; 3]>,
@@ -60,36 +57,15 @@ pub(crate) struct Integral {
     build: Option<Build>,
 }
 
-/// What "integral" names.
-#[derive(Clone, Copy)]
-enum ByName {
-    Form(Form),
-    Method(Method),
-}
-
-fn by_name(name: &str) -> Result<ByName, String> {
-    let form = Form::ALL.into_iter().find(|f| f.0 == name).map(|f| ByName::Form(f.1));
-    let method = || Method::ALL.into_iter().find(|m| m.0 == name).map(|m| ByName::Method(m.1));
-    form.or_else(method).ok_or_else(|| {
-        let known: Vec<&str> = Form::ALL.iter().map(|f| f.0).chain(Method::ALL.iter().map(|m| m.0)).collect();
-        format!("\"{name}\" is not known here; there is {}", known.join(", "))
-    })
-}
-
-impl ByName {
-    /// `choice` with this in it.
-    fn of(self, choice: Choice) -> Choice {
-        match self {
-            ByName::Form(form) => Choice { form, ..choice },
-            ByName::Method(method) => Choice { two: Two { method, ..choice.two }, ..choice },
-        }
-    }
+/// A form, or a method of two variables, that there is.
+fn by_name(name: &str) -> Result<String, String> {
+    Choice::default().named(name).map(|_| name.to_owned())
 }
 
 impl Integral {
     /// `choice`, with what was said in its place.
     pub(crate) fn apply(&self, choice: Choice) -> Choice {
-        let choice = self.integral.map_or(choice, |name| name.of(choice));
+        let choice = self.integral.as_deref().and_then(|name| choice.named(name).ok()).unwrap_or(choice);
         Choice {
             form: choice.form,
             table: self.table.or(choice.table),
@@ -140,18 +116,6 @@ impl Integral {
 
 /// A scene's "integral": the name of a form, or an object.
 pub(crate) fn of_scene(scene: &Scene, path: &Path) -> Result<Choice> {
-    match &scene.integral {
-        None => Ok(Choice::default()),
-        Some(Value::String(name)) => match by_name(name) {
-            Ok(named) => Ok(named.of(Choice::default())),
-            Err(what) => bail!("{}: integral: {what}", path.display()),
-        },
-        Some(value) => {
-            let choice: Choice = read(value).map_err(|what| anyhow!("{}: integral: {what}", path.display()))?;
-            if !(1..=MOST_PIECES).contains(&choice.two.pieces) {
-                bail!("{}: integral: two: pieces: there are 1 to {MOST_PIECES}", path.display());
-            }
-            Ok(choice)
-        }
-    }
+    let Some(value) = &scene.integral else { return Ok(Choice::default()) };
+    integral(value).map_err(|what| anyhow!("{}: integral: {what}", path.display()))
 }
