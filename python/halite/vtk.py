@@ -226,7 +226,8 @@ class Volume(vtkVolume):
         if shape == self._shape and stamp == self._values:
             return
         what = {"association": self.association, "component": self.component, "gradient_array": self._second}
-        if shape == self._shape and values is not None:
+        kept, self._shape = self._shape, None
+        if shape == kept and values is not None:
             what["association"] = "cell" if self._of_cells else "point"
             self._renderer.set_scalars(_support.vtk_to_numpy(values), **what)
         else:
