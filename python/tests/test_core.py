@@ -3,9 +3,12 @@
 import gc
 import os
 import pickle
+import signal
 import subprocess
 import sys
 import threading
+import time
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -129,8 +132,146 @@ def test_memory_is_level(box, fog):
         assert resident() - before < most, (what.__name__, resident() - before, most)
 
 
+@pytest.mark.parametrize("floats, ints", [(np.float64, np.int64), (np.float32, np.int32), (np.float32, np.uint64)])
+def test_arrays_are_copied_once(floats, ints):
+    """What numpy allocates meanwhile is next to nothing: arrays are read where they are, whatever their type."""
+    points, cells, offsets, types = lattice(30)
+    arrays = [points.astype(floats), cells.astype(ints), offsets.astype(ints), types.astype(np.uint8)]
+    scalars = points[:, 0].astype(floats)
+    data = {"point_data": {"s": scalars, "v": points.astype(floats)}, "cell_data": {"c": np.arange(len(types), dtype=ints)}}
+    mesh = halite.Mesh.from_arrays(*arrays, **data)
+    renderer = halite.Renderer(mesh, "s")
+    tracemalloc.start()
+    try:
+        mesh = halite.Mesh.from_arrays(*arrays, **data)
+        of_mesh = tracemalloc.get_traced_memory()[1]
+        tracemalloc.reset_peak()
+        renderer.set_scalars(scalars)
+        of_values = tracemalloc.get_traced_memory()[1]
+        tracemalloc.reset_peak()
+        halite.Mesh.from_arrays(np.asfortranarray(arrays[0]), *arrays[1:])
+        of_columns = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert max(of_mesh, of_values) < 20_000 < arrays[0].nbytes <= of_columns
+    # The copy is the mesh's own.
+    before = mesh.bounds
+    arrays[0][:] = 7
+    assert mesh.bounds == before
+
+
+def test_any_layout_and_type_is_taken():
+    points, cells, offsets, types = lattice(2)
+    data = points[:, 0]
+    view = halite.View((3, -2.5, 2), view_up=(0, 0, 1), size=(40, 40))
+    wanted = halite.Renderer(halite.Mesh.from_arrays(points, cells, offsets, types, point_data={"s": data})).render(view)
+    for change in (np.asfortranarray, lambda a: a.astype(a.dtype.newbyteorder(">")), lambda a: np.repeat(a, 2, 0)[::2], list,
+                   lambda a: np.ma.array(a) if a.ndim > 1 else a):
+        mesh = halite.Mesh.from_arrays(change(points), change(cells), change(offsets), change(types), point_data={"s": change(data)})
+        assert (halite.Renderer(mesh).render(view) == wanted).all()
+    mesh = halite.Mesh.from_arrays(points, cells, offsets, types, point_data={"flag": data > 0})
+    assert mesh.range("flag") == (0, 1)
+    with pytest.raises(halite.Error, match="complex|none of"):
+        halite.Mesh.from_arrays(points, cells, offsets, types, point_data={"s": data + 1j})
+
+
+def test_other_code_runs_while_it_draws(box, fog):
+    renderer = halite.Renderer(box, "s", transfer=fog, engine="traverse", threads=1)
+    counted, done = [0], threading.Event()
+
+    def count():
+        while not done.is_set():
+            counted[0] += 1
+            time.sleep(0.001)
+
+    thread = threading.Thread(target=count)
+    thread.start()
+    before = counted[0]
+    renderer.render(halite.View((3, -2.5, 2), size=(1500, 1500)))
+    while_drawing = counted[0] - before
+    done.set()
+    thread.join()
+    assert while_drawing > 10
+
+
+def test_ctrl_c_ends_a_frame_soon(box, fog):
+    renderer = halite.Renderer(box, "s", transfer=fog, engine="traverse", threads=1)
+    took = []
+    for _ in range(4):
+        sent = []
+
+        def interrupt():
+            sent.append(time.perf_counter())
+            os.kill(os.getpid(), signal.SIGINT)
+
+        timer = threading.Timer(0.2, interrupt)
+        timer.start()
+        with pytest.raises(KeyboardInterrupt):
+            renderer.render(halite.View((3, -2.5, 2), size=(9000, 9000)))
+        took.append(time.perf_counter() - sent[0])
+        timer.join()
+    # Others may have the cores meanwhile.
+    assert min(took) < 0.1, took
+    assert renderer.render(halite.View((3, -2.5, 2), size=(20, 20))) is not None
+
+
+def test_what_ends_rays(box, fog):
+    """Depths of each kind, opaque objects, clipping and cropping end rays where geometry says."""
+    eye = np.array([3, -2.5, 2])
+    back = eye / np.linalg.norm(eye)
+    renderer = halite.Renderer(box, "s", transfer=fog)
+    view = lambda **more: halite.View(eye, view_up=(0, 0, 1), view_angle=35, size=(64, 48), clipping_range=(0.5, 20), **more)
+    world, clip = look_at(eye), perspective(35, 4 / 3, 0.5, 20)
+    middle = np.linalg.norm(eye)
+    window = 0.5 + 0.5 * (clip @ [0, 0, -middle, 1])[2] / middle
+    truth = chord(clip @ world, 64, 48, np.full((48, 64), window))
+    x, y = np.meshgrid(2 * (np.arange(64) + 0.5) / 64 - 1, 1 - 2 * (np.arange(48) + 0.5) / 48)
+    slope = np.tan(np.radians(17.5))
+    along = middle * np.sqrt(1 + (x * slope * 4 / 3) ** 2 + (y * slope) ** 2)
+    wall = {"type": "plane", "point": [0, 0, 0], "normal": back, "color": [1, 0.5, 0.25]}
+    for picture in (renderer.render(view(), np.full((48, 64), window)),
+                    renderer.render(view(), np.full((48, 64), middle), depth_kind="eye"),
+                    renderer.render(view(), along, depth_kind="ray"),
+                    renderer.render(view(opaque=[wall])),
+                    renderer.render(view(planes=[((0, 0, 0), back)]))):
+        assert np.abs(picture - truth).max() < 3e-5
+    assert (view(opaque=[wall]).backdrop()[24, 32] == np.float32([1, 0.5, 0.25])).all()
+    half = chord(clip @ world, 64, 48)
+    cut = renderer.render(view(cropping=((-1, 1, -1, 1, -1, 0), "subvolume")))
+    other = renderer.render(view(cropping=((-1, 1, -1, 1, -1, 0), 0x7FFFFFF & ~0x0002000)))
+    # Transmittances of the parts multiply to that of the whole.
+    both = 1 - (1 - cut[..., 3]) * (1 - other[..., 3])
+    assert np.abs(both - half[..., 3]).max() < 1e-5 and np.abs(cut - half).max() > 0.1
+    with pytest.raises(halite.Error, match="window"):
+        renderer.render(halite.View(eye, size=(64, 48)), np.zeros((48, 64)))
+    with pytest.raises(halite.Error, match='"far"'):
+        renderer.render(view(), along, depth_kind="far")
+    with pytest.raises(halite.Error, match="fence"):
+        view(cropping=((0, 1, 0, 1, 0, 1), "wall"))
+    with pytest.raises(halite.Error, match="opaque.*radius"):
+        view(opaque=[{"type": "sphere", "center": [0, 0, 0]}])
+
+
+def test_options_of_drawing(box, fog):
+    view = halite.View((3, -2.5, 2), view_up=(0, 0, 1), size=(40, 30))
+    wanted = halite.Renderer(box, "s", transfer=fog).render(view)
+    table = halite.Renderer(box, "s", transfer=fog, integral={"form": "volume", "table": [8, 8, 64]}).render(view)
+    assert 0 < np.abs(table - wanted).max() < 0.05
+    for options, word in (({"integral": "cubic"}, "cubic"), ({"integral": {"form": "volume", "shape": 3}}, "shape"),
+                          ({"reconstruction": "9"}, "9"), ({"sampling": 1.0}, "sampling"), ({"projection": {"order": "sideways"}}, "sideways"),
+                          ({"placement": np.eye(3)}, "4, 4"), ({"component": "some"}, "some"), ({"gradient_array": "none"}, "none")):
+        with pytest.raises(halite.Error, match=word):
+            halite.Renderer(box, "s", **options)
+    with pytest.raises(halite.Error, match="table"):
+        halite.TransferFunction(table2d=(np.zeros((2, 2, 3)), (0, 1), (0, 1)))
+    with pytest.raises(halite.Error, match="lights"):
+        halite.TransferFunction(lights=[{"type": "headlight"}])
+    with pytest.raises(halite.Error, match="sigma"):
+        halite.TransferFunction(widgets=[{"type": "gaussian", "center": [0, 0], "color": [1, 1, 1], "opacity": 1}])
+
+
 def test_pickling_says_why_not(box):
-    for thing in (box, halite.Renderer(box)):
+    for thing in (box, halite.Renderer(box), halite.TransferFunction(), halite.View((1, 2, 3))):
         with pytest.raises(TypeError, match="pickled"):
             pickle.dumps(thing)
 

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """Volumes in windows of VTK, pixel by pixel against the truth."""
 import gc
+import os
+import subprocess
 import sys
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -253,6 +256,62 @@ def test_volumes_come_and_go_in_level_memory(fog):
     del v
     gc.collect()
     assert (pixels(w) == good).all() and (pixels(w) == good).all()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is read from /proc")
+def test_frames_take_level_memory(fog):
+    r = renderer()
+    halite.vtk.add_volume(r, grid(), transfer=fog)
+    w = window(r)
+
+    def frames():
+        for _ in range(150):
+            r.GetActiveCamera().Azimuth(1)
+            w.Render()
+        gc.collect()
+        return resident()
+
+    frames()
+    before = frames()
+    # A picture in ten would show.
+    assert frames() - before < 15 * 20 * SIZE[0] * SIZE[1]
+
+
+@pytest.mark.parametrize("order", ["volume renderer window", "window renderer volume", "renderer window volume", ""])
+def test_programs_end_in_any_order(order):
+    """Whatever is deleted first, and what the interpreter deletes itself."""
+    code = ("import sys; sys.path.insert(0, sys.argv[1])\n"
+            "import halite.vtk\nfrom windows import grid, renderer as r, window as w\n"
+            "renderer = r(); window = w(renderer); volume = halite.vtk.add_volume(renderer, grid())\n"
+            "window.Render(); frames = volume.frames\n"
+            "for name in sys.argv[2].split(): del globals()[name]\n"
+            "print('drawn', frames)")
+    here = os.path.dirname(os.path.abspath(__file__))
+    run = subprocess.run([sys.executable, "-c", code, here, order], capture_output=True, text=True)
+    assert run.returncode == 0 and run.stdout.strip() == "drawn 1" and "Error" not in run.stderr, run.stdout + run.stderr
+
+
+@pytest.mark.parametrize("bits", [32, 64])
+def test_vtks_arrays_are_read_where_they_are(bits):
+    g = grid(size=20)
+    cells = g.GetCells()
+    if bits == 32:
+        cells.ConvertTo32BitStorage()
+    arrays = [g.GetPoints().GetData(), cells.GetConnectivityArray(), g.GetPointData().GetScalars()]
+    for array in arrays:
+        address = int(array.GetVoidPointer(0).split("_")[1], 16)
+        assert halite._from_vtk._numpy(array).__array_interface__["data"][0] == address
+    assert halite._from_vtk._numpy(arrays[1]).itemsize == bits // 8
+    halite.Mesh.from_vtk(g)
+    tracemalloc.start()
+    try:
+        halite.Mesh.from_vtk(g)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    # VTK says by a function where cells of one kind start, which numpy must list.
+    listed = 8 * (g.GetNumberOfCells() + 1) if not cells.GetOffsetsArray().HasStandardMemoryLayout() else 0
+    assert peak < 30_000 + listed < vtk_to_numpy(arrays[1]).nbytes
 
 
 def test_kinds_of_grids():
