@@ -75,6 +75,15 @@ def _whole(what: str, numbers: npt.ArrayLike) -> npt.NDArray[Any]:
     return array
 
 
+def as_mesh(mesh: Any) -> Mesh:
+    """`mesh` itself, or the mesh of a grid of VTK or PyVista."""
+    if isinstance(mesh, Mesh):
+        return mesh
+    if hasattr(mesh, "IsA"):
+        return Mesh.from_vtk(mesh)
+    raise TypeError(f"a halite.Mesh or a grid of VTK is meant, and not {type(mesh).__name__}; halite.read(path) reads a file")
+
+
 class Mesh:
     """A mesh, or a regular or rectilinear grid, with its arrays.
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _halite
-from ._mesh import Mesh, read
+from ._mesh import as_mesh, read
 from ._renderer import Renderer
 from ._transfer import TransferFunction
 from ._view import View
@@ -148,8 +148,7 @@ def show(mesh: Any, scalars: Optional[str] = None, *, size: Sequence[int] = (102
     """
     if isinstance(mesh, (str, os.PathLike)):
         mesh = read(mesh)
-    elif not isinstance(mesh, Mesh):
-        mesh = Mesh.from_vtk(mesh)
+    mesh = as_mesh(mesh)
     wanted = None if scalars is None else mesh._find(scalars, options.get("association"))
     name, of_cells, core, transfer = _halite.automatic(mesh._core, wanted, [int(n) for n in size])
     if options.get("transfer") is None:

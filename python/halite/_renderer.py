@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _halite
-from ._mesh import Mesh, native
+from ._mesh import Mesh, as_mesh, native
 from ._transfer import TransferFunction, _plain
 from ._view import View
 
@@ -25,7 +25,7 @@ class Renderer:
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : Mesh, or a grid of VTK or PyVista
         What to draw.
     scalars : str or array, optional
         The array to draw, or values as of :meth:`set_scalars`; the mesh's first array by default.
@@ -75,7 +75,7 @@ class Renderer:
     mesh: Mesh
     """The mesh that is drawn."""
 
-    def __init__(self, mesh: Mesh, scalars: Union[str, npt.ArrayLike, None] = None, *, association: Optional[str] = None,
+    def __init__(self, mesh: Any, scalars: Union[str, npt.ArrayLike, None] = None, *, association: Optional[str] = None,
                  component: Component = None, transfer: Optional[TransferFunction] = None,
                  gradient_array: Union[str, npt.ArrayLike, None] = None, threads: int = 0, device: str = "auto", engine: str = "auto",
                  integral: Union[str, Mapping[str, Any], None] = None, reconstruction: Optional[str] = None,
@@ -89,14 +89,14 @@ class Renderer:
         self._transfer = transfer
         self.set_mesh(mesh, scalars, association=association, component=component, gradient_array=gradient_array, placement=placement)
 
-    def set_mesh(self, mesh: Mesh, scalars: Union[str, npt.ArrayLike, None] = None, *, association: Optional[str] = None,
+    def set_mesh(self, mesh: Any, scalars: Union[str, npt.ArrayLike, None] = None, *, association: Optional[str] = None,
                  component: Component = None, gradient_array: Union[str, npt.ArrayLike, None] = None,
                  placement: Optional[npt.ArrayLike] = None) -> None:
         """Draw another mesh from now on, with the same transfer function.
 
         Parameters
         ----------
-        mesh : Mesh
+        mesh : Mesh, or a grid of VTK or PyVista
             What to draw.
         scalars, association, component, gradient_array, placement
             As of the class.
@@ -114,6 +114,7 @@ class Renderer:
         rows = np.eye(4) if placement is None else np.asarray(placement, float)
         if rows.shape != (4, 4):
             raise _halite.Error(f"placement has the shape {rows.shape}, and not (4, 4)")
+        mesh = as_mesh(mesh)
         self._core.set_mesh(mesh._core, rows.tolist())
         self.mesh = mesh
         self.set_scalars(scalars, association=association, component=component, gradient_array=gradient_array)

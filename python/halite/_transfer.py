@@ -79,6 +79,10 @@ class TransferFunction:
                  table2d: Optional[Table] = None, silhouette: Optional[float] = None, shade: Optional[Shade] = None,
                  lights: Optional[Sequence[Mapping[str, Any]]] = None) -> None:
         low, high = (float(x) for x in clim)
+        if not low <= high:
+            raise _halite.Error(f"clim is a range that ascends, and not {low} to {high}")
+        if isinstance(opacity, str):
+            raise _halite.Error(f'opacity is a number or an array, and not "{opacity}"; halite.pyvista knows PyVista\'s names')
         second: dict[str, Any] = {}
         factors = np.asarray(gradient_opacity, float).reshape(-1, 2).tolist()
         for key, value in (("gradient_opacity", factors), ("widgets", list(widgets)), ("silhouette", silhouette),

@@ -113,6 +113,41 @@ class View:
         return cls._of(_limited(core, pixel_offset, planes, cropping, opaque))
 
     @classmethod
+    def from_vtk(cls, camera: Any, size: Sequence[int] = (1024, 768), **options: Any) -> View:
+        """Make a view of a camera of VTK or PyVista, without what it has of shears and off-axis projections.
+
+        Parameters
+        ----------
+        camera : vtkCamera
+            Or PyVista's class of it.
+        size : (width, height)
+            Of the picture, in pixels.
+        **options
+            As of the class: `pixel_offset`, `planes`, `cropping`, `opaque`.
+
+        Returns
+        -------
+        View
+            The view, with the camera's clipping range.
+
+        Raises
+        ------
+        Error
+            If the camera makes no view.
+
+        Examples
+        --------
+        >>> from vtkmodules.vtkRenderingCore import vtkCamera
+        >>> camera = vtkCamera()
+        >>> camera.SetPosition(0, 0, 5)
+        >>> halite.View.from_vtk(camera, (320, 240)).size
+        (320, 240)
+        """
+        scale = camera.GetParallelScale() if camera.GetParallelProjection() else None
+        return cls(camera.GetPosition(), camera.GetFocalPoint(), camera.GetViewUp(), view_angle=camera.GetViewAngle(),
+                   parallel_scale=scale, clipping_range=camera.GetClippingRange(), size=size, **options)
+
+    @classmethod
     def _of(cls, core: _halite.View) -> View:
         view = cls.__new__(cls)
         view._core = core

@@ -13,6 +13,7 @@ not.
 from __future__ import annotations
 
 import functools
+import os
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Optional, Union
@@ -20,6 +21,7 @@ from typing import Any, Optional, Union
 import numpy as np
 import numpy.typing as npt
 import pyvista
+from matplotlib.colors import ListedColormap
 from pyvista.plotting.colors import get_cmap_safe
 
 from . import Error, TransferFunction
@@ -108,11 +110,12 @@ def add_volume(plotter: pyvista.Plotter, volume: Any, scalars: Union[str, npt.Ar
     volume : pyvista.UnstructuredGrid, StructuredGrid, ImageData or RectilinearGrid
         Cells of any kind, without a triangulation. Followed when it is modified.
     scalars : str or array, optional
-        An array of the mesh by name, or values of its points or cells; the active one by default.
+        An array of the mesh by name, or values of its points or cells. By default the active one; without one, the first that varies,
+        real numbers before whole ones.
     clim : float or two floats, optional
         The range of scalars that colours and opacities lie over; one number is -clim to clim. The array's range by default.
-    cmap : str, list or colour map of matplotlib, optional
-        The theme's by default.
+    cmap : str, list, colour map of matplotlib, or pyvista.LookupTable, optional
+        The theme's by default. Of a table, its colours.
     opacity : float, str or array
         As PyVista has it: "linear", "sigmoid", "geom", with "_r", "sigmoid_5", one opacity, or opacities over the range, in [0, 1].
     n_colors : int
@@ -145,7 +148,7 @@ def add_volume(plotter: pyvista.Plotter, volume: Any, scalars: Union[str, npt.Ar
     user_matrix : array of shape (4, 4), optional
         Where the volume stands in the world; affine.
     component : int or "all", optional
-        As of :class:`halite.Renderer`.
+        As of :class:`halite.Renderer`. Of four bytes it is "all": they are colours themselves.
     silhouette, gradient_opacity
         As of :class:`halite.TransferFunction`.
     pickable : bool
@@ -183,24 +186,31 @@ def add_volume(plotter: pyvista.Plotter, volume: Any, scalars: Union[str, npt.Ar
                         f'add_volume: there is no keyword "{keyword}"')
     if blending not in ("composite", "maximum"):
         raise ValueError(f'blending is "composite" or "maximum", and not "{blending}"')
+    if isinstance(volume, pyvista.MultiBlock):
+        raise Error("a MultiBlock is several grids: add each of its blocks, or what its combine() makes of them")
+    if isinstance(volume, (str, os.PathLike)):
+        raise Error("a grid is meant, and not a path: pyvista.read(path) reads one")
     grid = pyvista.wrap(volume)
     if scalars is not None and not isinstance(scalars, str):
         given = np.asarray(scalars)
         grid, scalars = grid.copy(deep=False), "Data"
         (grid.point_data if len(given) == grid.n_points else grid.cell_data)[scalars] = given
     if scalars is None:
-        scalars = grid.active_scalars_name or next(iter(grid.array_names), None)
-    if scalars is None:
-        raise Error("the mesh has no array to draw")
+        scalars = _default(grid)
     order = ("point", "cell") if preference == "point" else ("cell", "point")
     association = next((a for a in order if scalars in (grid.point_data if a == "point" else grid.cell_data)), None)
     if association is None:
-        raise Error(f'no array is called "{scalars}"; there are ' + ", ".join(f'"{n}"' for n in grid.array_names))
+        names = [*grid.point_data.keys(), *grid.cell_data.keys()]
+        raise Error(f'no array is called "{scalars}"; there are ' + ", ".join(f'"{n}"' for n in names))
     values = np.asarray((grid.point_data if association == "point" else grid.cell_data)[scalars])
+    if component is None and values.ndim > 1 and values.shape[1] == 4 and values.dtype == np.uint8:
+        component = "all"
     low, high = _limits(clim, values, component, log_scale)
     if opacity_unit_distance is None:
         opacity_unit_distance = grid.length / max(2.0, round(max(grid.n_cells, 1) ** (1 / 3)))
     table = pyvista.LookupTable()
+    if isinstance(cmap, pyvista.LookupTable):
+        cmap = ListedColormap(np.asarray(cmap.values)[:, :3] / 255)
     map_of_colors = get_cmap_safe(cmap if cmap is not None else plotter._theme.cmap)
     map_of_colors = map_of_colors.reversed() if flip_scalars else map_of_colors
     table.apply_cmap(map_of_colors, n_colors)
@@ -230,7 +240,8 @@ def add_volume(plotter: pyvista.Plotter, volume: Any, scalars: Union[str, npt.Ar
     _limit(plotter)
     target: Any = plotter
     target.add_actor(actor, name=name, reset_camera=reset_camera, pickable=pickable, render=False)
-    if plotter._theme.show_scalar_bar if show_scalar_bar is None else show_scalar_bar:
+    has_map = not (component == "all" and values.ndim > 1 and values.shape[1] == 4)
+    if has_map and (plotter._theme.show_scalar_bar if show_scalar_bar is None else show_scalar_bar):
         mapper = pyvista.DataSetMapper()
         mapper.lookup_table = table
         mapper.scalar_range = (low, high)
@@ -240,11 +251,28 @@ def add_volume(plotter: pyvista.Plotter, volume: Any, scalars: Union[str, npt.Ar
     return actor
 
 
+def _default(grid: Any) -> str:
+    """The array that is drawn when nobody says: the active one, else the first that varies, real numbers before whole ones."""
+    active = grid.active_scalars_name
+    if active in grid.point_data or active in grid.cell_data:
+        return str(active)
+    # Arrays of the grid itself, such as times and titles, have no places.
+    arrays = [(n, np.asarray(data[n])) for data in (grid.point_data, grid.cell_data) for n in data.keys()]
+    arrays = [(n, a) for n, a in arrays if a.dtype.kind in "fiu" and a.size]
+    if not arrays:
+        raise Error("the mesh has no array to draw")
+    best = min(arrays, key=lambda array: (array[1].dtype.kind != "f", not np.ptp(array[1]) > 0))
+    return str(best[0])
+
+
 def _limits(clim: Any, values: Any, component: Any, log_scale: bool) -> tuple[float, float]:
     """The range that colours lie over: as asked for, or that of the finite values."""
     if clim is None:
         if values.ndim > 1:
-            values = values[:, component] if isinstance(component, int) else np.linalg.norm(values, axis=1)
+            if component == "all":
+                values = values[:, -1]
+            else:
+                values = values[:, component] if isinstance(component, int) else np.linalg.norm(values, axis=1)
         finite = values[np.isfinite(values) & (values > 0 if log_scale else True)]
         clim = (finite.min(), finite.max()) if len(finite) else (0, 1)
     elif isinstance(clim, (int, float)):

@@ -170,6 +170,11 @@ class Volume(vtkVolume):
         self._hold(True)
         self._follow()
 
+    def __repr__(self) -> str:
+        return f"<halite.vtk.Volume: {self.scalars or 'the active array'} of {self.mesh!r}>"
+
+    __str__ = __repr__
+
     @property
     def transfer(self) -> Optional[TransferFunction]:
         """The transfer function; it may be set."""

@@ -204,6 +204,9 @@ impl Renderer {
     }
 }
 
+/// So many points of a grid are looked at to choose colours and a view.
+const MOST_SAMPLES: usize = 1 << 16;
+
 /// The array, the view and the transfer function that show something of a mesh.
 #[pyfunction]
 pub(crate) fn automatic(
@@ -213,15 +216,22 @@ pub(crate) fn automatic(
     size: [u32; 2],
 ) -> PyResult<(String, bool, View, TransferFunction)> {
     let chosen = py.detach(|| {
-        let mesh = mesh.0.clone().into_mesh()?;
+        let own;
+        let mesh = match &mesh.0 {
+            DataSet::Mesh(mesh) => mesh,
+            DataSet::Grid(grid) => {
+                own = grid.coarse(MOST_SAMPLES)?.into_mesh()?;
+                &own
+            }
+        };
         let scalars = match name {
             Some((name, of_cells)) => Scalars { name, association: Some(association(of_cells)), component: None },
-            None => scene::automatic::scalars(&mesh, None)?,
+            None => scene::automatic::scalars(mesh, None)?,
         };
-        let tetrahedra = Tetrahedra::new(&mesh)?;
-        let field = scalars.field(&mesh)?;
+        let tetrahedra = Tetrahedra::new(mesh)?;
+        let field = scalars.field(mesh)?;
         let wishes = scene::automatic::Wishes { size: Some(size), ..Default::default() };
-        let scene = scene::automatic::scene(&mesh, &tetrahedra, scalars, &field, wishes)?;
+        let scene = scene::automatic::scene(mesh, &tetrahedra, scalars, &field, wishes)?;
         let view = halite::view::View::new(scene.camera, size)?;
         Ok((scene.scalars, field.association() == Association::Cell, view, scene.transfer))
     });

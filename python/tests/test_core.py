@@ -80,6 +80,12 @@ def test_what_is_wrong_is_named():
         halite.TransferFunction("nothing")
     with pytest.raises(halite.Error, match="opaque"):
         halite.TransferFunction(convention="opaque")
+    with pytest.raises(halite.Error, match="ascends"):
+        halite.TransferFunction("viridis", (1, 0))
+    with pytest.raises(halite.Error, match="halite.pyvista"):
+        halite.TransferFunction(opacity="sigmoid")
+    with pytest.raises(TypeError, match="halite.read"):
+        halite.Renderer("mesh.vtu")
 
 
 def test_frames_can_be_ended(box, fog):

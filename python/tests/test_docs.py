@@ -24,9 +24,9 @@ def modules():
             yield importlib.import_module(name)
 
 
-def public():
-    """Name and object of each public function, class and method; properties apart."""
-    for module in modules():
+def public(*of):
+    """Name and object of each public function, class and method of all or some modules; properties apart."""
+    for module in of or modules():
         for name in module.__all__:
             thing = getattr(module, name)
             if not callable(thing) or thing is halite.Error:
@@ -111,16 +111,14 @@ def test_examples_run(module, tmp_path, monkeypatch):
     if module.__name__ == "halite.pyvista":
         import pyvista
         names.update(pyvista=pyvista, grid=pyvista.wrap(names["grid"]))
-    has_vtk = importlib.util.find_spec("vtkmodules") is not None
-    tried = 0
-    runner = doctest.DocTestRunner()
-    for test in doctest.DocTestFinder(exclude_empty=True).find(module, module.__name__, module=module, extraglobs=names):
-        if "vtkmodules" in test.docstring and not has_vtk:
+    runner, tried = doctest.DocTestRunner(), {}
+    for name, thing in [(module.__name__, module), *public(module)]:
+        if "vtkmodules" in thing.__doc__ and not importlib.util.find_spec("vtkmodules"):
             continue
-        result = runner.run(test)
-        assert result.failed == 0, test.name
-        tried += result.attempted
-    assert tried >= {"halite": 28, "halite.vtk": 8, "halite.pyvista": 6}[module.__name__]
+        result = runner.run(doctest.DocTestParser().get_doctest(thing.__doc__, dict(names), name, None, None))
+        assert result.failed == 0, name
+        tried[name] = result.attempted
+    assert all(tried.values()) and len(tried) >= {"halite": 15, "halite.vtk": 4, "halite.pyvista": 2}[module.__name__]
 
 
 def test_the_stub_is_that_of_the_compiled_module():
@@ -143,7 +141,7 @@ def test_types_are_strict(tmp_path):
                      "pixels: npt.NDArray[np.float32] = renderer.render(halite.View((1, 2, 3), size=(4, 4)))\n"
                      "halite.Picture(pixels).save('a.png')\n"
                      "picture: halite.Picture = halite.show(mesh)\n")
-    wrong.write_text("import halite\nhalite.read(3)\nhalite.Renderer('mesh')\nhalite.View((1, 2, 3)).size + 1\n")
+    wrong.write_text("import halite\nhalite.read(3)\nhalite.Renderer(mesh='a', threads='all')\nhalite.View((1, 2, 3)).size + 1\n")
 
     def mypy(*arguments):
         return subprocess.run([sys.executable, "-m", "mypy", "--strict", "--config-file", os.devnull, "--cache-dir",

@@ -70,6 +70,28 @@ def test_keywords():
     p.close()
 
 
+def test_the_array_when_nobody_says():
+    grid = mesh()
+    grid.field_data["TimeValue"] = [0.5]
+    grid.cell_data["number"] = np.arange(grid.n_cells)
+    grid.set_active_scalars(None)
+    drawn = lambda: halite.pyvista.add_volume(plotter(), grid).scalars
+    assert drawn() == "x"
+    del grid.point_data["x"], grid.point_data["v"]
+    assert drawn() == "c"
+    del grid.cell_data["c"]
+    assert drawn() == "number"
+    grid.set_active_scalars("number")
+    grid.cell_data["other"] = np.linspace(0, 1, grid.n_cells)
+    grid.set_active_scalars("number")
+    assert drawn() == "number"
+    with pytest.raises(halite.Error, match='"TimeValue"; there are "number", "other"'):
+        halite.pyvista.add_volume(plotter(), grid, "TimeValue")
+    grid.clear_cell_data()
+    with pytest.raises(halite.Error, match="no array"):
+        halite.pyvista.add_volume(plotter(), grid)
+
+
 def test_with_a_slice_inside_and_updates():
     grid = mesh()
     p = plotter()
