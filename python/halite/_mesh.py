@@ -27,7 +27,7 @@ def read(path: Union[str, os.PathLike[str]], *, step: Optional[int] = None, time
     step : int, optional
         Which of several time steps, from 0. The first by default.
     time : float, optional
-        The time; the nearest step is read.
+        A time from the first to the last that there is; the nearest step is read.
 
     Returns
     -------
@@ -39,7 +39,7 @@ def read(path: Union[str, os.PathLike[str]], *, step: Optional[int] = None, time
     OSError
         If the file cannot be read.
     Error
-        If it is malformed or not supported, with the place in it, or has no such step.
+        If it is malformed or not supported, with the place in it, or has no such step or time.
     MemoryError
         If there is no memory for what it announces.
 

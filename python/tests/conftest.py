@@ -55,13 +55,13 @@ def look_at(eye, focus=(0, 0, 0), up=(0, 0, 1)):
     return m
 
 
-def tetrahedron(path):
+def tetrahedron(path, scalars=(0, 1, 2, 3)):
     """A file with one tetrahedron and its scalars."""
     def array(kind, name, numbers, more=""):
         return f'<DataArray type="{kind}" Name="{name}" format="ascii"{more}>{" ".join(map(str, numbers))}</DataArray>'
 
     path.write_text('<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian"><UnstructuredGrid>'
-                    '<Piece NumberOfPoints="4" NumberOfCells="1"><PointData>' + array("Float32", "s", [0, 1, 2, 3]) + "</PointData><Points>"
+                    '<Piece NumberOfPoints="4" NumberOfCells="1"><PointData>' + array("Float32", "s", scalars) + "</PointData><Points>"
                     + array("Float64", "Points", [0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1], ' NumberOfComponents="3"') + "</Points><Cells>"
                     + array("Int64", "connectivity", [0, 1, 2, 3]) + array("Int64", "offsets", [4]) + array("UInt8", "types", [10])
                     + "</Cells></Piece></UnstructuredGrid></VTKFile>\n")

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import halite
-from conftest import chord, lattice, look_at, perspective, resident
+from conftest import chord, lattice, look_at, perspective, resident, tetrahedron
 
 
 def test_pictures_are_the_integral(box, fog):
@@ -128,14 +128,17 @@ def test_memory_is_level(box, fog):
             mesh = halite.Mesh.from_arrays(points, cells, offsets, types, point_data={"s": points[:, 0].copy()})
             halite.Renderer(mesh, "s", threads=2).render(view)
 
-    # The first round fills what is kept; a leak of one frame in ten, or of one mesh in ten, shows in the second.
+    # The first round fills what is kept; a leak of one frame in ten, or of one mesh in ten, shows in the next ones. Two, as what
+    # allocators keep goes up and down by more than one mesh.
     for what, most in ((frames, 30 * of_frame), (renderers, 5 * 8 * of_mesh)):
         what()
         gc.collect()
         before = resident()
-        what()
+        for _ in range(2):
+            what()
         gc.collect()
-        assert resident() - before < most, (what.__name__, resident() - before, most)
+        grown = (resident() - before) / 2
+        assert grown < most, (what.__name__, grown, most)
 
 
 @pytest.mark.parametrize("floats, ints", [(np.float64, np.int64), (np.float32, np.int32), (np.float32, np.uint64)])
@@ -290,6 +293,26 @@ def test_grids():
     axes = [np.arange(n) * d for n, d in ((5, 0.5), (3, 1), (4, 0.7))]
     pictures = [halite.Renderer(g).render(view) for g in (grid, halite.Mesh.rectilinear(*axes, point_data={"v": values.ravel()}))]
     assert pictures[0][..., 3].max() > 0.1 and np.abs(pictures[0] - pictures[1]).max() < 1e-6
+
+
+def test_time_steps_are_read(tmp_path):
+    for step in (0, 1, 2):
+        tetrahedron(tmp_path / f"step{step}.vtu", [step, 1, 2, 5 + step])
+    steps = "".join(f'<DataSet timestep="{0.5 * k}" file="step{k}.vtu"/>' for k in (0, 1, 2))
+    (tmp_path / "series.pvd").write_text(f'<VTKFile type="Collection" version="0.1"><Collection>{steps}</Collection></VTKFile>')
+    of = lambda **which: halite.read(tmp_path / "series.pvd", **which).range("s")
+    assert of() == (0, 5) and of(step=2) == (1, 7) and of(time=0.6) == (1, 6)
+    with pytest.raises(halite.Error, match="3"):
+        of(step=3)
+    with pytest.raises(halite.Error, match="no time 9"):
+        of(time=9)
+    # The mesh stays, and its values are the next step's.
+    renderer, view = halite.Renderer(halite.read(tmp_path / "series.pvd"), "s"), halite.View((3, 2, 4), (0.3, 0.3, 0.3), size=(40, 30))
+    fixed = halite.TransferFunction("viridis", (0, 7), opacity=[0, 1], unit_distance=0.3)
+    renderer.set_transfer(fixed)
+    renderer.set_scalars(np.array([2, 1, 2, 7], np.float32))
+    wanted = halite.Renderer(halite.read(tmp_path / "step2.vtu"), "s", transfer=fixed).render(view)
+    assert (renderer.render(view) == wanted).all() and wanted[..., 3].max() > 0.2
 
 
 def test_pictures_are_files(box, tmp_path):

@@ -172,6 +172,23 @@ def test_a_matrix_moves_it(fog):
     assert low_high[:, 0] == pytest.approx(corners.min(0)) and low_high[:, 1] == pytest.approx(corners.max(0))
 
 
+def test_two_windows_at_once(fog):
+    """One volume, two renderers, two windows in turns; one of them is finalized, and comes back."""
+    first, second = renderer((0.2, 0, 0)), renderer((0, 0, 0.4))
+    v = halite.vtk.Volume(grid(), transfer=fog)
+    for r in (first, second):
+        v.add_to(r)
+    second.GetActiveCamera().SetPosition(-2, 3, 2.5)
+    windows = [window(first), window(second, size=(90, 100))]
+    for _ in range(2):
+        for w, r, size, background in zip(windows, (first, second), (SIZE, (90, 100)), ((0.2, 0, 0), (0, 0, 0.4))):
+            picture = pixels(w)[..., :3]
+            assert np.abs(picture - over(chord(to_clip(r), *size), background)).max() < NEAR
+    windows[0].Finalize()
+    assert np.abs(pixels(windows[1])[..., :3] - over(chord(to_clip(second), 90, 100), (0, 0, 0.4))).max() < NEAR
+    assert np.abs(pixels(windows[0])[..., :3] - over(chord(to_clip(first), *SIZE), (0.2, 0, 0))).max() < NEAR and v.error is None
+
+
 def test_the_one_added_last_is_over_the_others(fog):
     """Volumes in one renderer: the order in which they were added, whatever is in front."""
     green = halite.TransferFunction([(0, 0, 1, 0)], opacity=1.0, unit_distance=0.7)
