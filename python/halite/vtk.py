@@ -19,13 +19,13 @@ or for a tiled screenshot, it goes to ``sys.excepthook``, and the window lives o
 from __future__ import annotations
 
 import time
-import weakref
 from typing import Any, Optional
 
 import numpy as np
 
 import vtkmodules.vtkRenderingVolumeOpenGL2  # noqa: F401
 from vtkmodules.util import numpy_support
+from vtkmodules.vtkCommonCore import vtkCollection, vtkObject, vtkWeakReference
 from vtkmodules.vtkCommonDataModel import vtkImageData, vtkPiecewiseFunction
 from vtkmodules.vtkRenderingCore import vtkRenderer, vtkVolume
 from vtkmodules.vtkRenderingVolume import vtkFixedPointVolumeRayCastMapper
@@ -133,6 +133,7 @@ class Volume(vtkVolume):
                  association: Optional[str] = None, component: Any = None, maximum: bool = False, coarse: int = 2, threads: int = 0,
                  device: str = "auto", engine: str = "auto", integral: Any = None, reconstruction: Optional[str] = None,
                  sampling: Optional[float] = None, gradient_array: Optional[str] = None) -> None:
+        _let_go()
         self.grid, self.scalars, self.association, self.component = grid, scalars, association, component
         self.maximum, self.coarse, self.frames = maximum, int(coarse), 0
         self.error: Optional[BaseException] = None
@@ -145,9 +146,8 @@ class Volume(vtkVolume):
         self._values: Any = None
         self._drawn: Any = None
         self._now: Any = None
-        self._turning: Any = None
-        self._watched: dict[Any, tuple[int, int]] = {}
-        self._late: set[Any] = set()
+        self._watched: list[tuple[vtkWeakReference, list[int]]] = []
+        self._late = False
         self._image = vtkImageData()
         self._image.SetDimensions(2, 2, 2)
         self._image.AllocateScalars(3, 1)
@@ -167,7 +167,7 @@ class Volume(vtkVolume):
         self.GetProperty().SetScalarOpacity(nothing)
         self.GetProperty().ShadeOff()
         self.SetMapper(mapper)
-        self._hold(True)
+        _observe(mapper, "VolumeMapperRenderStartEvent", self, "_turn")
         self._follow()
 
     def __repr__(self) -> str:
@@ -212,7 +212,6 @@ class Volume(vtkVolume):
         >>> volume = halite.vtk.add_volume(left, grid)
         >>> volume.add_to(right)
         """
-        self._hold(True)
         self._watch(renderer)
         renderer.AddViewProp(self)
 
@@ -258,37 +257,21 @@ class Volume(vtkVolume):
                     return found
         return None
 
-    def _hold(self, strongly: bool) -> None:
-        """Has the mapper say when it is its turn. Strongly, the mapper keeps this object alive, which it belongs to."""
-        mapper: Any = self.GetMapper()
-        turn: Any = self._turn
-        if self._turning is not None:
-            was, observer = self._turning
-            if was == strongly:
-                return
-            mapper.RemoveObserver(observer)
-        if not strongly:
-            method = weakref.WeakMethod(self._turn)
-
-            def turn(*event: Any) -> None:
-                alive = method()
-                if alive is not None:
-                    alive(*event)
-
-        self._turning = (strongly, mapper.AddObserver("VolumeMapperRenderStartEvent", turn))
-
     def _leave(self, renderer: Any) -> None:
-        """Lets go of a renderer that the volume was removed from; of no more use to any, it lives while somebody has it."""
-        for observer in self._watched.pop(renderer, ()):
-            renderer.RemoveObserver(observer)
-        self._late.discard(renderer)
-        if not self._watched:
-            self._hold(False)
+        """Lets go of a renderer that the volume was removed from, and of those that are gone."""
+        kept = []
+        for watched, observers in self._watched:
+            if watched.Get() is renderer:
+                for observer in observers:
+                    renderer.RemoveObserver(observer)
+            elif watched.Get() is not None:
+                kept.append((watched, observers))
+        self._watched = kept
 
     def _watch(self, renderer: Any) -> None:
-        if renderer not in self._watched:
-            start = renderer.AddObserver("StartEvent", self._start)
-            self._watched[renderer] = (start, renderer.AddObserver("EndEvent", self._end))
+        if not any(watched.Get() is renderer for watched, _ in self._watched):
+            observers = [_observe(renderer, event, self, name) for event, name in (("StartEvent", "_start"), ("EndEvent", "_end"))]
+            self._watched.append((_weak(renderer), observers))
         if renderer.GetRenderWindow() is not None:
             Frames.of(renderer.GetRenderWindow())
 
@@ -296,18 +279,19 @@ class Volume(vtkVolume):
         if not renderer.HasViewProp(self):
             self._leave(renderer)
             return
+        _let_go()
         self._now = renderer
         Frames.of(renderer.GetRenderWindow())
         peels = renderer.GetUseDepthPeeling() and renderer.GetUseDepthPeelingForVolumes()
-        if peels and self.GetVisibility() and renderer.HasViewProp(self):
+        self._late = bool(peels and self.GetVisibility())
+        if self._late:
             # The carrier has nothing that could be peeled: it is drawn over what was.
             self.VisibilityOff()
-            self._late.add(renderer)
 
     def _end(self, renderer: Any, _: str) -> None:
         self._now = None
-        if renderer in self._late:
-            self._late.discard(renderer)
+        if self._late:
+            self._late = False
             self.VisibilityOn()
             self._paint(renderer)
 
@@ -330,7 +314,6 @@ class Volume(vtkVolume):
         return None
 
     def _turn(self, *_: Any) -> None:
-        self._hold(True)
         renderer = self._renderer_of_now()
         # Whoever picks gets what lies behind.
         if renderer is not None and renderer.GetSelector() is None:
@@ -406,6 +389,35 @@ class Volume(vtkVolume):
         self._drawn = (key, depth, picture)
         self.frames += 1
         return picture
+
+
+def _weak(thing: Any) -> vtkWeakReference:
+    reference = vtkWeakReference()
+    reference.Set(thing)
+    return reference
+
+
+def _observe(subject: Any, event: str, volume: Volume, name: str) -> int:
+    """Has an event call a method of the volume while there is the volume: nobody is kept alive by being watched.
+
+    VTK keeps what Python has of a volume as long as the volume itself, such as by a renderer.
+    """
+    reference = _weak(volume)
+
+    def call(*arguments: Any) -> None:
+        alive = reference.Get()
+        if alive is not None:
+            getattr(alive, name)(*arguments)
+
+    observer: int = subject.AddObserver(event, call)
+    return observer
+
+
+def _let_go() -> None:
+    """Has VTK let go of what Python had of objects that are deleted: it looks whenever it keeps such things of another one."""
+    kept, holder = vtkObject(), vtkCollection()
+    holder.AddItem(kept)
+    vars(kept)["held"] = True
 
 
 def _is_occluded(renderer: Any) -> bool:

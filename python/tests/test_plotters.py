@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """What plotters of PyVista do with a volume, pixel by pixel against closed forms, and what they cannot do."""
+import gc
 import io
 import time
 import warnings
+import weakref
 
 import numpy as np
 import pytest
@@ -232,6 +234,22 @@ def test_what_users_of_pyvista_give():
     picture = halite.Renderer(grid(), "s", transfer=fog).render(halite.View.from_vtk(p.camera, SIZE))
     assert np.abs(shot(p) - over(picture, (0, 0, 0))).max() < NEAR
     p.close()
+
+
+def test_plotters_come_and_go():
+    """A plotter that is closed keeps nothing, nor does anything keep it."""
+    alive = []
+    for shown in (True, True, False):
+        p, volume = box()
+        if shown:
+            p.show(auto_close=False)
+        alive += [weakref.ref(p), weakref.ref(volume), weakref.ref(volume._renderer)]
+        p.close()
+        del p, volume
+    p, _ = box()
+    p.close()
+    gc.collect()
+    assert [a() for a in alive] == [None] * 9
 
 
 def test_names_take_each_others_place():

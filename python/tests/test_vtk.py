@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import tracemalloc
+import weakref
 
 import numpy as np
 import pytest
@@ -222,6 +223,31 @@ def test_windows_come_and_go(fog):
         gc.collect()
         v = halite.vtk.add_volume(r, grid(), transfer=fog)
     assert (pixels(window(r)) == first).all()
+
+
+@pytest.mark.parametrize("how", ["removed", "with its window", "never shown"])
+def test_volumes_are_freed_with_what_shows_them(fog, how):
+    r = renderer()
+    v = halite.vtk.add_volume(r, grid(), transfer=fog)
+    w = window(r)
+    core = weakref.ref(v._renderer)
+    if how != "never shown":
+        w.Render()
+    alive = weakref.ref(v)
+    del v
+    gc.collect()
+    assert core() is not None, "the renderer has it"
+    if how == "removed":
+        r.RemoveViewProp(r.GetVolumes().GetItemAsObject(0))
+        # VTK keeps its list of volumes until it makes another.
+        assert r.GetVolumes().GetNumberOfItems() == 0
+    else:
+        del w, r
+    gc.collect()
+    # With the next volume, or the next frame of one.
+    other = halite.vtk.Volume(grid(), transfer=fog)
+    gc.collect()
+    assert other.frames == 0 and alive() is None and core() is None, "VTK has it no more"
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is read from /proc")
