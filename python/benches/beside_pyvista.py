@@ -3,8 +3,8 @@
 
     xvfb-run -a python python/benches/beside_pyvista.py [--cubes 32] [--views 8] [--size 512]
 
-The wheel is to be a release build (`maturin build --release`). Seconds of wall clock and of CPU, which tell less of what else the machine
-does; medians over the views. Then what a frame takes besides drawing: depths read back, the picture handed to the window, and VTK's own.
+The wheel is to be a release build (`maturin build --release`). Wall clock and CPU time, which says less of what else the machine does;
+medians over the views. Then what a frame takes besides the core's own: depths read back, the picture handed to the window, and VTK.
 """
 import argparse
 import pathlib

@@ -150,7 +150,10 @@ def _table(table: Optional[Table]) -> Optional[tuple[npt.NDArray[np.float64], li
 
 def _colors(color: Color, low: float, high: float) -> list[list[float]]:
     if isinstance(color, str):
-        return _halite.colormap(color, low, high)
+        try:
+            return _halite.colormap(color, low, high)
+        except _halite.Error as error:
+            raise _halite.Error(f"{error}; others of matplotlib may be given as objects") from None
     if callable(color):
         return [[low + (high - low) * u, *map(float, color(float(u))[:3])] for u in np.linspace(0, 1, 256)]
     knots: list[list[float]] = np.asarray(color, float).reshape(-1, 4).tolist()

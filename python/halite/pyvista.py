@@ -6,9 +6,9 @@
 >>> plotter = pyvista.Plotter(off_screen=True)
 >>> volume = halite.pyvista.add_volume(plotter, grid, scalars="pressure", cmap="inferno", opacity="sigmoid")
 
-What :mod:`halite.vtk` says of its limits holds: translucent geometry goes under the volume, ``enable_ssao`` is refused, exports (to HTML, glTF and
-others) leave the volume out and warn of it once. Views that a server draws, those of trame and notebooks, show it; those that a browser draws do
-not.
+What :mod:`halite.vtk` says of its limits holds: translucent geometry goes under the volume, ``enable_ssao`` is refused, exports (to
+HTML, glTF and others) leave the volume out and warn of it once. Views that a server draws, those of trame and notebooks, show it;
+those that a browser draws do not.
 """
 from __future__ import annotations
 

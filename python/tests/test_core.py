@@ -267,8 +267,9 @@ def test_options_of_drawing(box, fog):
     table = halite.Renderer(box, "s", transfer=fog, integral={"form": "volume", "table": [8, 8, 64]}).render(view)
     assert 0 < np.abs(table - wanted).max() < 0.05
     for options, word in (({"integral": "cubic"}, "cubic"), ({"integral": {"form": "volume", "shape": 3}}, "shape"),
-                          ({"reconstruction": "9"}, "9"), ({"sampling": 1.0}, "sampling"), ({"projection": {"order": "sideways"}}, "sideways"),
-                          ({"placement": np.eye(3)}, "4, 4"), ({"component": "some"}, "some"), ({"gradient_array": "none"}, "none")):
+                          ({"reconstruction": "9"}, "9"), ({"sampling": 1.0}, "sampling"),
+                          ({"projection": {"order": "sideways"}}, "sideways"), ({"placement": np.eye(3)}, "4, 4"),
+                          ({"component": "some"}, "some"), ({"gradient_array": "none"}, "none")):
         with pytest.raises(halite.Error, match=word):
             halite.Renderer(box, "s", **options)
     with pytest.raises(halite.Error, match="table"):

@@ -22,7 +22,8 @@ from windows import NEAR, SIZE, depth_of, grid, over, plane, to_clip  # noqa: E4
 
 WIDTH, HEIGHT = SIZE
 BEHIND = (0.2, 0.4, 0.8)
-FOG = {"cmap": matplotlib.colors.ListedColormap([COLOR, COLOR]), "clim": (0, 2), "opacity": 1.0, "opacity_unit_distance": 1 / K, "show_scalar_bar": False}
+FOG = {"cmap": matplotlib.colors.ListedColormap([COLOR, COLOR]), "clim": (0, 2), "opacity": 1.0, "opacity_unit_distance": 1 / K,
+       "show_scalar_bar": False}
 
 
 def box(**options):
@@ -303,6 +304,31 @@ def test_exports_say_once_what_they_leave_out(tmp_path):
         warnings.simplefilter("error")
         p.export_obj(tmp_path / "scene.obj")
     assert (tmp_path / "scene.gltf").stat().st_size > 100 and (tmp_path / "scene.obj").stat().st_size > 100
+    p.close()
+
+
+def test_a_mouse_drags_coarse_frames_and_leaves_an_exact_one():
+    p, volume = box()
+    look(p)
+    p.show(auto_close=False)
+    interactor, rates = p.iren.interactor, []
+    p.renderer.AddObserver("EndEvent", lambda *_: rates.append(p.render_window.GetDesiredUpdateRate()))
+
+    def mouse(event, x):
+        interactor.SetEventInformation(x, HEIGHT // 2, 0, 0, chr(0), 0, None)
+        interactor.InvokeEvent(event)
+
+    mouse("MouseMoveEvent", 60)
+    mouse("LeftButtonPressEvent", 60)
+    sizes = []
+    for x in (64, 70, 80):
+        mouse("MouseMoveEvent", x)
+        sizes.append(volume._drawn[2].shape[:2])
+    dragged = len(rates)
+    assert dragged >= 3 and min(rates) > 1 and sizes == [(HEIGHT // 2, WIDTH // 2)] * 3
+    mouse("LeftButtonReleaseEvent", 80)
+    assert len(rates) > dragged and rates[-1] < 1 and volume._drawn[2].shape[:2] == (HEIGHT, WIDTH)
+    assert p.camera.position[0] < 2 and np.abs(shot(p) - truth(p, None)).max() < NEAR
     p.close()
 
 
