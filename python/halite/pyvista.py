@@ -40,7 +40,7 @@ _REFUSED = {
     "culling": "a volume has no faces",
     "multi_colors": "one grid is drawn at a time",
 }
-_EXPORTS = ("export_gltf", "export_html", "export_obj", "export_vrml", "export_vtksz")
+_EXPORTS = ("export_gltf", "export_html", "export_obj", "export_vrml", "export_vtksz", "export_wasm_html", "export_wazex")
 
 
 def _bends(places: Any, values: Any, tolerance: float) -> list[int]:
@@ -85,9 +85,11 @@ def _limit(plotter: Any) -> None:
     """Has a plotter say what it cannot do with the volume."""
     if getattr(plotter.export_html, "__name__", "") == "export_html" and not hasattr(plotter.export_html, "__wrapped__"):
         warned: list[str] = []
-        for name in _EXPORTS:
-            if hasattr(plotter, name):
-                setattr(plotter, name, _warning(getattr(plotter, name), warned))
+        # What trame-pyvista adds to plotters, where it is installed, has exports of its own.
+        for exporter in (plotter, getattr(plotter, "trame", None)):
+            for name in _EXPORTS:
+                if hasattr(exporter, name):
+                    setattr(exporter, name, _warning(getattr(exporter, name), warned))
         plotter.enable_ssao = _refuse_ssao
 
 
