@@ -29,7 +29,9 @@ def cell_types(grid: Any) -> Any:
     with warnings.catch_warnings():
         # Deprecated from 9.6 on, where the new name is that of another method before.
         warnings.simplefilter("ignore", DeprecationWarning)
-        return grid.GetCellTypesArray()
+        types = grid.GetCellTypesArray()
+    # Releases that keep one type for all cells say so by an array of another class.
+    return types if types is not None else grid.GetCellTypes()
 
 
 def _data(attributes: Any) -> dict[str, Any]:

@@ -222,12 +222,12 @@ def add_volume(plotter: pyvista.Plotter, volume: Any, scalars: Union[str, npt.Ar
     shares = np.linspace(0, 1, n_colors)
     places = np.exp(np.log(low) + (np.log(high) - np.log(low)) * shares) if log_scale else low + (high - low) * shares
     colors = map_of_colors(shares)[:, :3]
-    colors = np.column_stack([places, colors])[_bends(shares, colors, 0.5 * _BYTE)]
+    colors = np.column_stack([places, colors])[_bends(places, colors, 0.5 * _BYTE)]
     if isinstance(opacity, (int, float)):
         alphas = np.full((n_colors, 1), float(opacity))
     else:
         alphas = np.asarray(pyvista.opacity_transfer_function(opacity, n_colors), float)[:, None] / 255
-    opacities = np.column_stack([places, alphas])[_bends(shares, alphas, _BYTE)]
+    opacities = np.column_stack([places, alphas])[_bends(places, alphas, _BYTE)]
     transfer = TransferFunction(
         colors, opacity=opacities, unit_distance=opacity_unit_distance,
         convention="opacity" if isinstance(grid, (pyvista.ImageData, pyvista.RectilinearGrid)) else "extinction",

@@ -181,6 +181,25 @@ def test_the_scalar_bar_has_the_colours():
     p.close()
 
 
+@pytest.mark.parametrize("log_scale", [False, True])
+def test_scales(log_scale):
+    """One value all over has the colour and the opacity of its share of the range."""
+    p = pyvista.Plotter(off_screen=True, window_size=SIZE)
+    p.set_background("black")
+    p.disable_anti_aliasing()
+    colors = matplotlib.colors.LinearSegmentedColormap.from_list("two", [(1, 0, 0), (0, 1, 0)])
+    halite.pyvista.add_volume(p, pyvista.wrap(grid(np.full(27, 10.0))), "s", clim=(1, 100), cmap=colors, opacity=[0.0, 1.0],
+                              log_scale=log_scale, opacity_unit_distance=1 / K, show_scalar_bar=False)
+    look(p)
+    p.show(auto_close=False)
+    share = 0.5 if log_scale else 9 / 99
+    alpha = 1 - (1 - chord(to_clip(p.renderer), *SIZE)[..., 3]) ** share
+    wanted = 255 * alpha[..., None] * [1 - share, share, 0]
+    # Colours and opacities are PyVista's, in 8 bits.
+    assert wanted.max() > 15 and np.abs(shot(p) - wanted).max() < NEAR + 1
+    p.close()
+
+
 def test_a_user_matrix_and_clim():
     p, _ = box()
     q = pyvista.Plotter(off_screen=True, window_size=SIZE)

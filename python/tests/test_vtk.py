@@ -365,6 +365,20 @@ def test_kinds_of_grids():
     assert all(np.abs(p - pictures[0]).max() < 2e-6 for p in pictures[1:])
 
 
+def test_cells_of_one_type(fog):
+    """VTK keeps one type for all cells of a grid that is made so, from 9.6 on without an array of them."""
+    made = grid()
+    of_one = vtkCommonDataModel.vtkUnstructuredGrid()
+    of_one.SetPoints(made.GetPoints())
+    of_one.SetCells(12, made.GetCells())
+    of_one.GetPointData().SetScalars(made.GetPointData().GetScalars())
+    meshes = [halite.Mesh.from_vtk(g) for g in (made, of_one)]
+    assert [m.n_cells for m in meshes] == [8, 8]
+    view = halite.View((3, -2.5, 2), view_up=(0, 0, 1), size=(40, 40))
+    pictures = [halite.Renderer(m, transfer=fog).render(view) for m in meshes]
+    assert (pictures[0] == pictures[1]).all() and pictures[0][..., 3].max() > 0.1
+
+
 def test_polyhedra():
     g = vtkCommonDataModel.vtkUnstructuredGrid()
     points, cells, offsets, types = lattice(1)

@@ -5,7 +5,7 @@ import pytest
 
 pytest.importorskip("vtkmodules")
 
-from vtkmodules import vtkCommonTransforms, vtkRenderingAnnotation, vtkRenderingCore, vtkRenderingOpenGL2  # noqa: E402
+from vtkmodules import vtkCommonDataModel, vtkCommonTransforms, vtkRenderingAnnotation, vtkRenderingCore, vtkRenderingOpenGL2  # noqa: E402
 from vtkmodules import vtkInteractionWidgets, vtkRenderingFreeType  # noqa: E402, F401
 from vtkmodules.util.numpy_support import vtk_to_numpy  # noqa: E402
 
@@ -261,6 +261,46 @@ def test_a_dragged_window_is_coarse_and_a_still_one_exact(fog):
         else:
             assert np.abs(picture - truth).max() < NEAR
     assert v.frames == drawn + 2
+
+
+def test_points_and_cells_are_followed(fog):
+    g = grid()
+    r = renderer()
+    v = halite.vtk.add_volume(r, g, transfer=fog)
+    w = window(r)
+    points = vtk_to_numpy(g.GetPoints().GetData())
+    w.Render()
+    # Half as large: as twice as far away, with half the extinction for each length.
+    points *= 0.5
+    g.GetPoints().GetData().Modified()
+    g.GetPoints().Modified()
+    picture = pixels(w)[..., :3]
+    twice = to_clip(r) @ np.diag([0.5, 0.5, 0.5, 1])
+    alpha = 1 - np.sqrt(1 - chord(twice, *SIZE)[..., 3])
+    assert alpha.max() > 0.5 and np.abs(picture - 255 * alpha[..., None] * COLOR).max() < NEAR
+    assert v.GetBounds() == pytest.approx((-0.5, 0.5, -0.5, 0.5, -0.5, 0.5))
+    points *= 2
+    g.GetPoints().Modified()
+    lower = grid(size=1)
+    g.SetCells(12, lower.GetCells())
+    g.SetPoints(lower.GetPoints())
+    g.GetPointData().SetScalars(lower.GetPointData().GetScalars())
+    assert np.abs(pixels(w)[..., :3] - over(chord(to_clip(r), *SIZE), (0, 0, 0))).max() < NEAR and v.mesh.n_cells == 1
+
+
+def test_clipping_planes_of_the_mapper(fog):
+    """Cut by a plane that looks at the camera, the volume is that in front of an opaque one, over nothing."""
+    r = renderer()
+    v = halite.vtk.add_volume(r, grid(), transfer=fog)
+    cut = vtkCommonDataModel.vtkPlane()
+    cut.SetNormal(3, -2.5, 2)
+    v.GetMapper().AddClippingPlane(cut)
+    w = window(r)
+    r.ResetCameraClippingRange()
+    truth = chord(to_clip(r), *SIZE, np.full((HEIGHT, WIDTH), depth_of(r, 0.0)))
+    assert truth[..., 3].max() > 0.5 and np.abs(pixels(w)[..., :3] - over(truth, (0, 0, 0))).max() < NEAR
+    v.GetMapper().RemoveAllClippingPlanes()
+    assert np.abs(pixels(w)[..., :3] - over(chord(to_clip(r), *SIZE), (0, 0, 0))).max() < NEAR and v.error is None
 
 
 def test_a_time_series_takes_values_alone(fog, monkeypatch):
