@@ -59,7 +59,7 @@ def main():
                     shutil.copy(pathlib.Path(folder) / name, DOCS / name)
     notebook, shown = run_notebook()
     for cell, png in zip((c for c in notebook["cells"] if c["cell_type"] == "code"), shown):
-        data = {"image/png": base64.b64encode(png).decode(), "text/plain": ["<halite.Picture>"]} if png else None
+        data = {"image/png": base64.b64encode(png).decode(), "text/plain": ["<halite.Picture: 320 x 240 pixels>"]} if png else None
         cell["outputs"] = [{"output_type": "execute_result", "execution_count": None, "metadata": {}, "data": data}] if png else []
     (DOCS / "python.ipynb").write_text(json.dumps(notebook, indent=1, ensure_ascii=False) + "\n")
 
