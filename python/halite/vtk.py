@@ -379,13 +379,14 @@ class Volume(vtkVolume):
         if self._drawn is not None and self._drawn[0] == key and np.array_equal(self._drawn[1], depth):
             return self._drawn[2]
         size = (-(-width // step), -(-height // step))
-        view = View.from_matrices(to_eye, to_clip, size, planes=planes)
+        # Upside down: rows begin at the top there, and at the bottom in windows.
+        view = View.from_matrices(to_eye, np.diag([1, -1, 1, 1]) @ to_clip, size, planes=planes)
         depths = depth[step // 2::step, step // 2::step] if step > 1 else depth
         if step > 1:
             pad = ((0, size[1] - depths.shape[0]), (0, size[0] - depths.shape[1]))
             depths = np.pad(depths, pad, mode="edge")
-        ends = np.ascontiguousarray(depths[::-1]) if depths.min() < 1 else None
-        picture = np.ascontiguousarray(self._renderer.render(view, ends, maximum=self.maximum)[::-1])
+        ends = depths if depths.min() < 1 else None
+        picture = self._renderer.render(view, ends, maximum=self.maximum)
         self._drawn = (key, depth, picture)
         self.frames += 1
         return picture
