@@ -27,7 +27,7 @@ use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::field::{Association, Component, Field};
 use crate::grid::Grid;
-use crate::integral::choice::{Choice, MOST_PIECES};
+use crate::integral::Choice;
 use crate::memory;
 use crate::mesh::{Array, Arrays};
 use crate::transfer::TransferFunction;
@@ -259,9 +259,7 @@ pub fn integral(value: &Value) -> std::result::Result<Choice, String> {
         return Choice::default().named(name);
     }
     let choice: Choice = read(value)?;
-    if !(1..=MOST_PIECES).contains(&choice.two.pieces) {
-        return Err(format!("two: pieces: there are 1 to {MOST_PIECES}"));
-    }
+    choice.two.check().map_err(|what| format!("two: {what}"))?;
     Ok(choice)
 }
 
