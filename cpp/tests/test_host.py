@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """What is done again, and what is not; the object factory; progress and abort."""
 import os
+import re
 import subprocess
 import sys
 
@@ -106,6 +107,36 @@ def test_print_and_settings():
     for word in ("Device: cpu", "Engine: auto", "Integral: exact", "OpacityConvention: ByInput", "ImageSampleDistance: 1"):
         assert word in text, word
     assert m.IsSupported(window()) and m.GetUseFloatingPointFrameBuffer()
+
+
+def test_threads():
+    """As many as the environment says, unless the mapper does; a share of the cores where a launcher started several processes."""
+    share = max(1, os.cpu_count() // 2)
+    for settings, asked, threads in (({"HALITE_THREADS": "3"}, 0, 3), ({"HALITE_THREADS": "3"}, 2, 2),
+                                     ({"HALITE_THREADS": "3", "VTK_SMP_MAX_THREADS": "1"}, 0, 1),
+                                     ({"MPI_LOCALNRANKS": "2"}, 0, min(share, len(os.sched_getaffinity(0))))):
+        os.environ.update(settings)
+        v = volume(lattice(2, field=SLANT), WAVES, RAMP)
+        v.GetMapper().SetNumberOfThreads(asked)
+        pixels(scene(v)[0])
+        assert re.search(rf"\b{threads} thread", v.GetMapper().GetAdapter()), (settings, asked, v.GetMapper().GetAdapter())
+        for name in settings:
+            del os.environ[name]
+
+
+def test_fewer_pixels_while_the_host_interacts():
+    v = volume(lattice(2, field=SLANT), WAVES, RAMP)
+    m = v.GetMapper()
+    w, r = scene(v)
+    rest = pixels(w)
+    m.SetInteractiveImageSampleDistance(2)
+    assert np.abs(pixels(w) - rest).max() == 0
+    m.SetInteracting(True)
+    coarse = pixels(w)
+    m.SetInteracting(False)
+    assert np.abs(coarse - rest).max() > 2 and np.abs(pixels(w) - rest).max() == 0
+    m.SetImageSampleDistance(2)
+    assert np.abs(pixels(w) - coarse).max() == 0
 
 
 def test_multi_block_mapper():

@@ -332,6 +332,34 @@ halite::Grid MeshView::Grid(vtkDataSet* base, bool isNearest)
 std::vector<std::uint64_t> MeshView::Identity(vtkDataSet* base)
 {
   auto grid = vtkUnstructuredGrid::SafeDownCast(base);
+  if (IsGrid(base))
+  {
+    // A grid's own time is that of its values, too. But that of its ghosts does not say when one of them was changed.
+    std::vector<std::uint64_t> identity{ HasGhosts(base) ? Time(base) : 0 };
+    const auto add = [&identity](double value) {
+      identity.push_back(0);
+      std::memcpy(&identity.back(), &value, sizeof value);
+    };
+    if (auto image = vtkImageData::SafeDownCast(base))
+    {
+      std::for_each(image->GetExtent(), image->GetExtent() + 6, add);
+      std::for_each(image->GetOrigin(), image->GetOrigin() + 3, add);
+      std::for_each(image->GetSpacing(), image->GetSpacing() + 3, add);
+      std::for_each(image->GetDirectionMatrix()->GetData(), image->GetDirectionMatrix()->GetData() + 9, add);
+    }
+    else if (auto axes = vtkRectilinearGrid::SafeDownCast(base))
+    {
+      for (vtkDataArray* axis : { axes->GetXCoordinates(), axes->GetYCoordinates(), axes->GetZCoordinates() })
+      {
+        identity.push_back(static_cast<std::uint64_t>(axis->GetNumberOfTuples()));
+        for (vtkIdType i = 0; i < axis->GetNumberOfTuples(); ++i)
+        {
+          add(axis->GetComponent(i, 0));
+        }
+      }
+    }
+    return identity;
+  }
   if (!grid)
   {
     return { Time(base) };

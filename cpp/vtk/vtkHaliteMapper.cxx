@@ -176,7 +176,7 @@ void vtkHaliteMapper::Internals::DrawIn(vtkOpenGLRenderWindow* window, vtkRender
     }
     const Content content = this->Choose(grid, volume, renderer, isMaximum);
     // Where surfaces end rays there is nothing between two pixels.
-    const double distance = pass ? 1 : this->Self.ImageSampleDistance;
+    const double distance = pass ? 1 : this->SampleDistance();
     SceneView view(renderer, static_cast<int>(std::ceil(viewport.Width / distance)),
       static_cast<int>(std::ceil(viewport.Height / distance)), isMaximum, this->Self.ClippingPlanes);
     if (this->Self.Cropping)
@@ -349,12 +349,15 @@ void vtkHaliteMapper::PrintSelf(ostream& os, vtkIndent indent)
   }
   os << "\n" << indent << "CroppingRegionFlags: " << this->CroppingRegionFlags << "\n";
   os << indent << "ImageSampleDistance: " << this->ImageSampleDistance << "\n";
+  os << indent << "InteractiveImageSampleDistance: " << this->InteractiveImageSampleDistance << "\n";
+  os << indent << "Interacting: " << (this->Interacting ? "On" : "Off") << "\n";
   os << indent << "NumberOfThreads: " << this->NumberOfThreads << "\n";
   os << indent << "UseFloatingPointFrameBuffer: " << (this->UseFloatingPointFrameBuffer ? "On" : "Off") << "\n";
   os << indent << "PrepareTime: " << this->PrepareTime << "\n";
   os << indent << "DepthTime: " << this->DepthTime << "\n";
   os << indent << "CoreTime: " << this->CoreTime << "\n";
   os << indent << "PresentTime: " << this->PresentTime << "\n";
+  os << indent << "Adapter: " << this->GetAdapter() << "\n";
   os << indent << "NumberOfFrames: " << this->GetNumberOfFrames() << "\n";
   os << indent << "NumberOfMeshUploads: " << this->GetNumberOfMeshUploads() << "\n";
   os << indent << "NumberOfPointUploads: " << this->GetNumberOfPointUploads() << "\n";

@@ -247,7 +247,26 @@ public:
 
   ///@{
   /**
-   * Threads of this mapper where the CPU draws; 0 (the default) is one for each core.
+   * The distance that is used instead while the host interacts (SetInteracting), if it is greater. 4 by default; 1 draws as at rest,
+   * and 0 leaves it to the host to show something else meanwhile, which is up to that host.
+   */
+  vtkSetClampMacro(InteractiveImageSampleDistance, double, 0.0, 100.0);
+  vtkGetMacro(InteractiveImageSampleDistance, double);
+  ///@}
+
+  ///@{
+  /**
+   * Whether the host interacts: the user drags the camera, and wants frames soon. Off by default; VTK alone never turns it on.
+   */
+  vtkSetMacro(Interacting, bool);
+  vtkGetMacro(Interacting, bool);
+  ///@}
+
+  ///@{
+  /**
+   * Threads of this mapper where the CPU draws. 0 (the default): as many as the environment variable HALITE_THREADS says; without it,
+   * one for each core that this process may use. Of processes that an MPI launcher started, each has its share of the node's cores. The
+   * environment variable VTK_SMP_MAX_THREADS limits both.
    */
   vtkSetClampMacro(NumberOfThreads, int, 0, 1024);
   vtkGetMacro(NumberOfThreads, int);
@@ -329,6 +348,8 @@ protected:
   double CroppingRegionPlanes[6] = { 0, 1, 0, 1, 0, 1 };
   int CroppingRegionFlags = 0x0002000;
   double ImageSampleDistance = 1.0;
+  double InteractiveImageSampleDistance = 4.0;
+  bool Interacting = false;
   int NumberOfThreads = 0;
   bool UseFloatingPointFrameBuffer = true;
 

@@ -4,6 +4,7 @@
 #include "FrameGuard.h"
 #include "MeshView.h"
 #include "Peeling.h"
+#include "Threads.h"
 
 #include "vtkCamera.h"
 #include "vtkCellData.h"
@@ -173,7 +174,7 @@ Content vtkHaliteMapper::Internals::Choose(vtkDataSet* grid, vtkVolume* volume, 
 {
   Clock clock(this->Self.PrepareTime);
   halite::Settings settings;
-  settings.threads = static_cast<std::size_t>(this->Self.NumberOfThreads);
+  settings.threads = Threads::Of(this->Self.NumberOfThreads);
   settings.device = Text(this->Self.Device);
   settings.engine = Text(this->Self.Engine);
   halite::Integral& integral = settings.integral;
@@ -330,6 +331,12 @@ bool vtkHaliteMapper::Internals::Peel(
   };
   peeling.Composite(pass, &this->Self, volume, isAlone, textureOf(kept), textureOf(front), textureOf(back));
   return true;
+}
+
+double vtkHaliteMapper::Internals::SampleDistance() const
+{
+  const double distance = this->Self.ImageSampleDistance;
+  return this->Self.Interacting ? std::max(distance, this->Self.InteractiveImageSampleDistance) : distance;
 }
 
 void vtkHaliteMapper::Internals::Defer(vtkRenderer* renderer, vtkVolume* volume)

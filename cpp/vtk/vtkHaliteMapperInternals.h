@@ -140,6 +140,8 @@ struct vtkHaliteMapper::Internals
   // Lets go what was made for a window: at once, or when the frame that is at work is over.
   void Release(vtkWindow* window);
   Content Choose(vtkDataSet* grid, vtkVolume* volume, vtkRenderer* renderer, bool isMaximum);
+  // Between rays, in pixels.
+  double SampleDistance() const;
   // Draws once the renderer has finished.
   void Defer(vtkRenderer* renderer, vtkVolume* volume);
 

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 #include "vtkHaliteVolumeRepresentation.h"
 
+#include "AnyGridVolume.h"
 #include "OneGrid.h"
+#include "SteadyGrid.h"
 #include "vtkHaliteMapper.h"
 
 #include "vtkAlgorithmOutput.h"
@@ -14,10 +16,12 @@
 #include "vtkPVRenderView.h"
 #include "vtkPolyDataMapper.h"
 #include "vtkUnstructuredGrid.h"
+#include "vtkVolumeProperty.h"
 
 struct vtkHaliteVolumeRepresentation::Internals
 {
   OneGrid Input;
+  SteadyGrid Drawn;
   vtkSmartPointer<vtkUnstructuredGrid> Grid = vtkSmartPointer<vtkUnstructuredGrid>::New();
 };
 
@@ -26,6 +30,9 @@ vtkStandardNewMacro(vtkHaliteVolumeRepresentation);
 vtkHaliteVolumeRepresentation::vtkHaliteVolumeRepresentation()
   : Inner(new Internals)
 {
+  this->Actor = vtkSmartPointer<AnyGridVolume>::New();
+  this->Actor->SetProperty(this->Property);
+  this->Actor->SetLODMapper(this->LODMapper);
 }
 
 vtkHaliteVolumeRepresentation::~vtkHaliteVolumeRepresentation() = default;
@@ -51,6 +58,31 @@ void vtkHaliteVolumeRepresentation::RemoveAllBlockSelectors()
 {
   this->Inner->Input.ClearSelectors();
   this->Superclass::RemoveAllBlockSelectors();
+}
+
+void vtkHaliteVolumeRepresentation::SetShade(bool shade)
+{
+  this->Property->SetShade(shade);
+}
+
+void vtkHaliteVolumeRepresentation::SetAmbient(double ambient)
+{
+  this->Property->SetAmbient(ambient);
+}
+
+void vtkHaliteVolumeRepresentation::SetDiffuse(double diffuse)
+{
+  this->Property->SetDiffuse(diffuse);
+}
+
+void vtkHaliteVolumeRepresentation::SetSpecular(double specular)
+{
+  this->Property->SetSpecular(specular);
+}
+
+void vtkHaliteVolumeRepresentation::SetSpecularPower(double power)
+{
+  this->Property->SetSpecularPower(power);
 }
 
 int vtkHaliteVolumeRepresentation::FillInputPortInformation(int port, vtkInformation* information)
@@ -116,6 +148,11 @@ int vtkHaliteVolumeRepresentation::ProcessViewRequest(
   }
   else if (request == vtkPVView::REQUEST_UPDATE_LOD())
   {
+    if (mapper->GetInteractiveImageSampleDistance() > 0)
+    {
+      // Halite itself draws, with fewer pixels, where the cells are.
+      vtkPVRenderView::SetRequiresDistributedRenderingLOD(inInfo, this, true);
+    }
     this->LODGeometryFilter->SetInputData(vtkPVView::GetPiece(inInfo, this));
     this->LODGeometryFilter->SetUseOutline(inInfo->Has(vtkPVRenderView::USE_OUTLINE_FOR_LOD()) ? 1 : 0);
     this->LODGeometryFilter->Update();
@@ -124,11 +161,15 @@ int vtkHaliteVolumeRepresentation::ProcessViewRequest(
   else if (request == vtkPVView::REQUEST_RENDER())
   {
     this->UpdateMapperParameters();
-    this->Actor->SetEnableLOD(inInfo->Has(vtkPVRenderView::USE_LOD()) ? 1 : 0);
-    vtkAlgorithmOutput* delivered = vtkPVRenderView::GetPieceProducer(inInfo, this);
-    if (delivered && vtkDataSet::SafeDownCast(delivered->GetProducer()->GetOutputDataObject(0)))
+    const bool isInteracting = inInfo->Has(vtkPVRenderView::USE_LOD());
+    mapper->SetInteracting(isInteracting);
+    this->Actor->SetEnableLOD(isInteracting && mapper->GetInteractiveImageSampleDistance() <= 0 ? 1 : 0);
+    vtkAlgorithmOutput* producer = vtkPVRenderView::GetPieceProducer(inInfo, this);
+    vtkDataSet* delivered =
+      producer ? vtkDataSet::SafeDownCast(producer->GetProducer()->GetOutputDataObject(0)) : nullptr;
+    if (delivered)
     {
-      mapper->SetInputConnection(delivered);
+      mapper->SetInputData(this->Inner->Drawn.Of(delivered));
     }
     else
     {

@@ -37,6 +37,17 @@ public:
   void RemoveAllBlockSelectors();
   ///@}
 
+  ///@{
+  /**
+   * Light, by the lights of the view, as vtkVolumeProperty has it; off at first. ParaView's other mappers of unstructured grids have none.
+   */
+  void SetShade(bool shade);
+  void SetAmbient(double ambient);
+  void SetDiffuse(double diffuse);
+  void SetSpecular(double specular);
+  void SetSpecularPower(double power);
+  ///@}
+
 protected:
   vtkHaliteVolumeRepresentation();
   ~vtkHaliteVolumeRepresentation() override;

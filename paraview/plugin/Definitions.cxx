@@ -14,14 +14,33 @@
 namespace
 {
 
-// Representations of volumes, and their classes with Halite.
-const std::map<std::string, std::string> Volumes = {
-  { "UnstructuredGridVolumeRepresentation", "vtkHaliteVolumeRepresentation" },
-  { "StructuredGridVolumeRepresentation", "vtkHaliteVolumeRepresentation" },
+// A representation of volumes, and its classes with Halite.
+struct Volume
+{
+  const char* Name;
+  const char* Class;
+  const char* SIClass;
 };
 
-// Representations whose displays show the properties of those.
-const char* const Displays[] = { "UnstructuredGridRepresentation", "StructuredGridRepresentation" };
+const Volume Volumes[] = {
+  { "UnstructuredGridVolumeRepresentation", "vtkHaliteVolumeRepresentation", "vtkSIHaliteVolumeRepresentationProxy" },
+  { "StructuredGridVolumeRepresentation", "vtkHaliteVolumeRepresentation", "vtkSIHaliteVolumeRepresentationProxy" },
+  { "UniformGridVolumeRepresentation", "vtkHaliteImageVolumeRepresentation",
+    "vtkSIHaliteImageVolumeRepresentationProxy" },
+};
+
+// A representation whose displays show the properties of those, and that whose properties from representations.xml it shows.
+struct Display
+{
+  const char* Name;
+  const char* Volume;
+};
+
+const Display Displays[] = {
+  { "UnstructuredGridRepresentation", "UnstructuredGridVolumeRepresentation" },
+  { "StructuredGridRepresentation", "UnstructuredGridVolumeRepresentation" },
+  { "UniformGridRepresentation", "UniformGridVolumeRepresentation" },
+};
 
 const char* const Group = "representations";
 const char* const SubProxy = "VolumeHaliteMapper";
@@ -80,9 +99,53 @@ std::vector<std::string> MapperProperties()
   return names;
 }
 
+// What a property is shown by: the display's mapper is Halite.
+const char* const Shown =
+  R"(<Hints><PropertyWidgetDecorator type="GenericDecorator" mode="visibility" property="SelectMapper"
+  value="Halite"/></Hints>)";
+
+// What representations.xml has for a representation of volumes.
+vtkSmartPointer<vtkPVXMLElement> Additions(const char* volume)
+{
+  const vtkSmartPointer<vtkPVXMLElement> all = Parse(RepresentationsXML);
+  for (unsigned int i = 0; all && i < all->GetNumberOfNestedElements(); ++i)
+  {
+    if (Attribute(all->GetNestedElement(i), "of") == volume)
+    {
+      return all->GetNestedElement(i);
+    }
+  }
+  return vtkSmartPointer<vtkPVXMLElement>::New();
+}
+
+std::string Mapper()
+{
+  const vtkSmartPointer<vtkPVXMLElement> mapper = Parse(MapperXML);
+  for (unsigned int i = 0; i < mapper->GetNumberOfNestedElements(); ++i)
+  {
+    Add(mapper->GetNestedElement(i), Shown);
+  }
+  return Text(mapper);
+}
+
 // Whether the representation has a list of mappers; Halite is in it now.
 bool AddMapper(vtkPVXMLElement* representation)
 {
+  const vtkSmartPointer<vtkPVXMLElement> additions = Additions(representation->GetAttributeOrEmpty("name"));
+  for (unsigned int i = 0; i < additions->GetNumberOfNestedElements(); ++i)
+  {
+    vtkPVXMLElement* property = additions->GetNestedElement(i);
+    // A later ParaView may have what this one lacks.
+    if (!Child(representation, property->GetName(), property->GetAttributeOrEmpty("name")))
+    {
+      const bool isList = Attribute(property, "name") == "SelectMapper";
+      if (!isList)
+      {
+        Add(property, Shown);
+      }
+      representation->AddNestedElement(property);
+    }
+  }
   vtkPVXMLElement* list = Child(Child(representation, "StringVectorProperty", "SelectMapper"), "StringListDomain");
   if (!list)
   {
@@ -100,8 +163,8 @@ bool AddMapper(vtkPVXMLElement* representation)
   return true;
 }
 
-// Whether the display has the properties of a volume; the mapper's are among them now.
-bool AddProperties(vtkPVXMLElement* display)
+// Whether the display has the properties of a volume; those of the volume's additions and the mapper's are among them now.
+bool AddProperties(vtkPVXMLElement* display, const char* volume)
 {
   for (unsigned int i = 0; i < display->GetNumberOfNestedElements(); ++i)
   {
@@ -115,11 +178,27 @@ bool AddProperties(vtkPVXMLElement* display)
     {
       return false;
     }
+    const auto expose = [group](const std::string& name) {
+      if (!Child(group, "Property", name.c_str()))
+      {
+        Add(group,
+          "<Property name=\"" + name +
+            "\" panel_visibility=\"advanced\" panel_visibility_default_for_representation=\"volume\"/>");
+      }
+    };
+    const vtkSmartPointer<vtkPVXMLElement> additions = Additions(volume);
+    for (unsigned int j = 0; j < additions->GetNumberOfNestedElements(); ++j)
+    {
+      vtkPVXMLElement* property = additions->GetNestedElement(j);
+      // The display's surfaces have what is shared, under the same name.
+      if (!property->GetAttribute("shared"))
+      {
+        expose(property->GetAttributeOrEmpty("name"));
+      }
+    }
     for (const std::string& name : MapperProperties())
     {
-      Add(group,
-        "<Property name=\"Halite" + name +
-          "\" panel_visibility=\"advanced\" panel_visibility_default_for_representation=\"volume\"/>");
+      expose("Halite" + name);
     }
     return true;
   }
@@ -183,19 +262,19 @@ std::string Definitions::WithHalite() const
       vtkGenericWarningMacro("Halite knows no way into this ParaView's " << name << ", and is not in it");
     }
   };
-  for (const auto& [name, className] : Volumes)
+  for (const Volume& volume : Volumes)
   {
-    change(name, [&, volumeClass = className.c_str()](vtkPVXMLElement* proxy) {
-      proxy->SetAttribute("class", volumeClass);
-      proxy->SetAttribute("si_class", "vtkSIHaliteVolumeRepresentationProxy");
+    change(volume.Name, [&volume](vtkPVXMLElement* proxy) {
+      proxy->SetAttribute("class", volume.Class);
+      proxy->SetAttribute("si_class", volume.SIClass);
       // What has a base has the base's list.
       return proxy->GetAttribute("base_proxyname") ? true : AddMapper(proxy);
     });
   }
-  for (const char* name : Displays)
+  for (const Display& display : Displays)
   {
-    change(name, AddProperties);
+    change(display.Name, [&display](vtkPVXMLElement* proxy) { return AddProperties(proxy, display.Volume); });
   }
-  return std::string("<ServerManagerConfiguration><ProxyGroup name=\"mappers\">") + MapperXML +
+  return std::string("<ServerManagerConfiguration><ProxyGroup name=\"mappers\">") + Mapper() +
     "</ProxyGroup><ProxyGroup name=\"" + Group + "\">" + changed + "</ProxyGroup></ServerManagerConfiguration>";
 }

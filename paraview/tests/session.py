@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 from paraview import servermanager, simple
+from vtkmodules import vtkRenderingCore
 from vtkmodules.util import numpy_support
 
 sys.path.insert(0, os.environ["HALITE_TESTS"])
@@ -45,6 +46,20 @@ def source(data):
     return s
 
 
+def series(folder, writer, ending, steps):
+    """A reader of these data objects as steps at times 0, 1, ..., each a file of its own in the folder."""
+    with open(os.path.join(folder, "series.pvd"), "w") as f:
+        f.write('<VTKFile type="Collection" version="0.1"><Collection>')
+        for k, data in enumerate(steps):
+            w = writer()
+            w.SetFileName(os.path.join(folder, f"{k}.{ending}"))
+            w.SetInputData(data)
+            w.Write()
+            f.write(f'<DataSet timestep="{k}" file="{k}.{ending}"/>')
+        f.write("</Collection></VTKFile>")
+    return simple.PVDReader(FileName=os.path.join(folder, "series.pvd"))
+
+
 def show(producer, v, array=("POINTS", "s"), color=((0, 1, 1, 1),), opacity=((0, 1),), unit=1.0, mapper="Halite",
          representation=None):
     """Shows a source as a volume."""
@@ -69,9 +84,21 @@ def picture(v):
     return numpy_support.vtk_to_numpy(image.GetPointData().GetScalars()).reshape(h, w, -1)[..., :3].astype(int)
 
 
+def window(v):
+    """What the view's window shows now, as `picture` has it, without drawing it anew."""
+    grab = vtkRenderingCore.vtkWindowToImageFilter()
+    grab.SetInput(v.SMProxy.GetRenderWindow())
+    grab.ShouldRerenderOff()
+    grab.ReadFrontBufferOff()
+    grab.Update()
+    image = grab.GetOutput()
+    w, h, _ = image.GetDimensions()
+    return numpy_support.vtk_to_numpy(image.GetPointData().GetScalars()).reshape(h, w, -1)[..., :3].astype(int)
+
+
 def mapper_of(display):
-    """The active mapper behind a display of this process."""
-    return display.GetClientSideObject().GetActiveRepresentation().GetActiveVolumeMapper()
+    """The mapper that drew last behind a display of this process."""
+    return display.GetClientSideObject().GetActiveRepresentation().GetActor().GetMapper()
 
 
 def count(display, what):

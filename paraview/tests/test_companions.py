@@ -56,6 +56,49 @@ def test_a_legend():
     simple.Delete(v)
 
 
+def test_selection_passes_to_what_lies_behind():
+    v = session.view()
+    d = session.show(session.source(lattice(3, cells="mixed")), v, color=COLOR, opacity=OPACITY)
+    plane = simple.Plane(Origin=[-5, -5, -0.5], Point1=[5, -5, -0.5], Point2=[-5, 5, -0.5])
+    plane.XResolution = plane.YResolution = 4
+    simple.Show(plane, v)
+    shown = session.picture(v)
+    w, h = v.ViewSize
+    simple.SelectSurfaceCells(Rectangle=[w // 2 - 2, h // 2 - 2, w // 2 + 2, h // 2 + 2], View=v)
+    simple.SetActiveSource(plane)
+    picked = simple.ExtractSelection(Input=plane)
+    picked.UpdatePipeline()
+    assert 1 <= picked.GetDataInformation().GetNumberOfCells() <= 4
+    simple.ClearSelection(plane)
+    assert session.apart(session.picture(v), shown) == 0
+    simple.Delete(picked)
+    simple.Delete(v)
+
+
+def test_fewer_pixels_while_the_camera_is_dragged():
+    v = session.view(size=(192, 160))
+    v.LODThreshold = 0
+    d = session.show(session.source(lattice(3, cells="mixed")), v, color=COLOR, opacity=OPACITY)
+    still = session.picture(v)
+    frames = session.count(d, "Frames")
+    v.SMProxy.InteractiveRender()
+    dragged = session.window(v)
+    assert "Interacting: On" in str(session.mapper_of(d)) and session.count(d, "Frames") == frames + 1
+    # A sixteenth of the pixels, enlarged: the volume, whose edges are blurred.
+    assert 10 < session.apart(dragged, still) and abs(dragged - still).mean() < 3
+    d.HaliteInteractiveImageSampleDistance = 1
+    v.SMProxy.InteractiveRender()
+    assert session.apart(session.window(v), still) == 0
+    # ParaView's surface, which is of one opacity.
+    d.HaliteInteractiveImageSampleDistance = 0
+    frames = session.count(d, "Frames")
+    v.SMProxy.InteractiveRender()
+    assert session.apart(session.window(v), still) > 30 and session.count(d, "Frames") == frames
+    d.HaliteInteractiveImageSampleDistance = 4
+    assert session.apart(session.picture(v), still) == 0
+    simple.Delete(v)
+
+
 if __name__ == "__main__":
     session.load()
     main(dict(globals()))

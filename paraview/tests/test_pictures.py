@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """Boxes whose pictures are known, drawn by Halite in ParaView."""
 import os
+import re
 import tempfile
 
 import session
@@ -142,6 +143,68 @@ def test_settings_in_a_saved_state():
         assert "Engine: traverse" in text and "OpacityConvention: Opacity" in text and "NumberOfThreads: 2" in text, text
         d.ScalarOpacityFunction.Points = [x for s, a in slab for x in (s, a, 0.5, 0)]
         check(session.picture(v), session.truth(v, color=COLOR, opacity=slab, slab=True))
+        done(v)
+
+
+def test_time_changes_only_values():
+    """Points and cells of each step are read anew, and are equal: the mesh is handed to the core once, as long as they are."""
+    steps = [lattice(3, cells="mixed", field=lambda p, k=k: p[:, 2] * (1 - 0.2 * k)) for k in range(3)]
+    steps.append(lattice(3, cells="mixed", low=(0, 0, 0.1)))
+    steps.append(lattice(3, cells="tet", low=(0, 0, 0.1)))
+    with tempfile.TemporaryDirectory() as folder:
+        v = session.view()
+        d = session.show(session.series(folder, vtkIOXML.vtkXMLUnstructuredGridWriter, "vtu", steps), v, color=COLOR,
+                         opacity=OPACITY)
+        for k in range(3):
+            v.ViewTime = k
+            check(session.picture(v), session.truth(v, field=lambda q: q[..., 2] * (1 - 0.2 * k), **ABOUT), what=f"step {k}")
+        assert [session.count(d, what) for what in ("MeshUploads", "FieldUploads", "FunctionUploads")] == [1, 3, 1]
+        # Other points, and then other cells.
+        for k in (3, 4):
+            v.ViewTime = k
+            check(session.picture(v), session.truth(v, low=(0, 0, 0.1), **ABOUT), what=f"step {k}")
+            assert session.count(d, "MeshUploads") == k - 1
+        done(v)
+
+
+def test_light():
+    """The field's gradient looks up, and the view's light is the camera's."""
+    v, d, _ = drawn(lattice(3, cells="mixed"))
+    v.UseLight = 0
+    light = simple.AddLight(view=v)
+    light.Coords, light.Intensity, light.DiffuseColor = "Camera", 1, [1, 1, 1]
+    d.Shade = 1
+    d.Ambient, d.Diffuse, d.Specular = 0.3, 0.7, 0
+    camera = np.array(v.CameraFocalPoint) - v.CameraPosition
+    towards = abs(camera[2]) / np.linalg.norm(camera)
+    check(session.picture(v), session.truth(v, lit=lambda rgb, *_: rgb * (0.3 + 0.7 * towards), **ABOUT), near=2)
+    done(v)
+
+
+def test_regions():
+    v, d, _ = drawn(lattice(3, cells="mixed"))
+    d.HaliteCropping, d.HaliteCroppingRegionPlanes = 1, [0.1, 0.5, 0, 1, 0.2, 0.7]
+    check(session.picture(v), session.truth(v, low=(0.1, 0, 0.2), high=(0.5, 1, 0.7), **ABOUT))
+    d.HaliteCroppingRegionFlags = "Cross"
+    inside = lambda p: sum((p[..., a] > low) & (p[..., a] < high) for a, low, high in ((0, 0.1, 0.5), (2, 0.2, 0.7)))
+    # The planes of the second axis are those of the box, so all is between them.
+    check(session.picture(v), session.truth(v, keep=lambda p: inside(p) >= 1, steps=1500, **ABOUT), near=2)
+    done(v)
+
+
+def test_threads():
+    """As many as the environment says, unless the display does."""
+    for settings, asked, threads in (({"HALITE_THREADS": "3"}, 0, 3), ({"HALITE_THREADS": "3"}, 2, 2),
+                                     ({"HALITE_THREADS": "3", "VTK_SMP_MAX_THREADS": "1"}, 0, 1),
+                                     ({"OMPI_COMM_WORLD_LOCAL_SIZE": str(2 * os.cpu_count())}, 0, 1)):
+        os.environ.update(settings)
+        v, d, p = drawn(lattice(2))
+        d.HaliteNumberOfThreads = asked
+        check(session.picture(v), session.truth(v, **ABOUT))
+        text = str(session.mapper_of(d))
+        assert re.search(rf"Adapter: .*\b{threads} thread", text), (settings, asked, re.search("Adapter: .*", text))
+        for name in settings:
+            del os.environ[name]
         done(v)
 
 

@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+#include "vtkHaliteImageVolumeRepresentation.h"
+
+#include "AnyGridVolume.h"
+#include "vtkHaliteMapper.h"
+
+#include "vtkDataObject.h"
+#include "vtkDataSet.h"
+#include "vtkInformation.h"
+#include "vtkMatrix4x4.h"
+#include "vtkObjectFactory.h"
+#include "vtkPVRenderView.h"
+#include "vtkPartitionedDataSet.h"
+#include "vtkPlane.h"
+#include "vtkPlaneCollection.h"
+#include "vtkPolyDataMapper.h"
+#include "vtkVolumeMapper.h"
+#include "vtkVolumeProperty.h"
+
+#include <array>
+#include <string>
+
+struct vtkHaliteImageVolumeRepresentation::Internals
+{
+  vtkNew<AnyGridVolume> Volume;
+  vtkSmartPointer<vtkHaliteMapper> Mapper;
+  bool IsChosen = false;
+  bool HasWarned = false;
+  // The mapper's own second array while that of the representation takes its place.
+  bool IsReplaced = false;
+  std::string OwnSecond;
+  std::string Replacement;
+};
+
+vtkStandardNewMacro(vtkHaliteImageVolumeRepresentation);
+
+vtkHaliteImageVolumeRepresentation::vtkHaliteImageVolumeRepresentation()
+  : Inner(new Internals)
+{
+  this->Actor = this->Inner->Volume;
+  this->Actor->SetProperty(this->Property);
+  this->Actor->SetLODMapper(this->OutlineMapper);
+}
+
+vtkHaliteImageVolumeRepresentation::~vtkHaliteImageVolumeRepresentation() = default;
+
+void vtkHaliteImageVolumeRepresentation::AddVolumeMapper(const char* name, vtkAbstractVolumeMapper* mapper)
+{
+  if (name && std::string(name) == "Halite")
+  {
+    this->Inner->Mapper = vtkHaliteMapper::SafeDownCast(mapper);
+  }
+}
+
+void vtkHaliteImageVolumeRepresentation::SetActiveVolumeMapper(const char* name)
+{
+  this->Inner->IsChosen = name && std::string(name) == "Halite";
+  this->Modified();
+}
+
+vtkAbstractVolumeMapper* vtkHaliteImageVolumeRepresentation::GetActiveVolumeMapper()
+{
+  const int blend = this->VolumeMapper->GetBlendMode();
+  const bool isVolume = blend == vtkVolumeMapper::COMPOSITE_BLEND || blend == vtkVolumeMapper::MAXIMUM_INTENSITY_BLEND;
+  if (this->Inner->IsChosen && this->Inner->Mapper && isVolume)
+  {
+    return this->Inner->Mapper;
+  }
+  return this->VolumeMapper;
+}
+
+int vtkHaliteImageVolumeRepresentation::ProcessViewRequest(
+  vtkInformationRequestKey* request, vtkInformation* inInfo, vtkInformation* outInfo)
+{
+  if (request == vtkPVView::REQUEST_RENDER() && this->Inner->Mapper)
+  {
+    this->Inner->Mapper->SetInteracting(inInfo->Has(vtkPVRenderView::USE_LOD()) != 0);
+  }
+  return this->Superclass::ProcessViewRequest(request, inInfo, outInfo);
+}
+
+namespace
+{
+
+// What a mapper of one grid can take of what was delivered: the grid, or the only one of several partitions. Else null.
+vtkDataSet* OnlyGrid(vtkDataObject* delivered)
+{
+  if (auto partitions = vtkPartitionedDataSet::SafeDownCast(delivered))
+  {
+    vtkDataSet* only = nullptr;
+    for (unsigned int i = 0; i < partitions->GetNumberOfPartitions(); ++i)
+    {
+      if (vtkDataSet* partition = partitions->GetPartition(i))
+      {
+        if (only)
+        {
+          return nullptr;
+        }
+        only = partition;
+      }
+    }
+    return only;
+  }
+  return vtkDataSet::SafeDownCast(delivered);
+}
+
+// Planes around a box that a matrix moves, whose inside is in front of each.
+vtkSmartPointer<vtkPlaneCollection> Around(const std::array<double, 6>& box, vtkMatrix4x4* matrix)
+{
+  vtkNew<vtkMatrix4x4> back;
+  vtkMatrix4x4::Invert(matrix, back);
+  auto planes = vtkSmartPointer<vtkPlaneCollection>::New();
+  for (int i = 0; i < 6; ++i)
+  {
+    const int axis = i / 2;
+    const double sign = i % 2 == 0 ? 1 : -1;
+    double point[4] = { 0, 0, 0, 1 };
+    point[axis] = box[static_cast<std::size_t>(i)];
+    matrix->MultiplyPoint(point, point);
+    vtkNew<vtkPlane> plane;
+    plane->SetOrigin(point[0], point[1], point[2]);
+    // Normals are moved by the transpose of the inverse.
+    plane->SetNormal(
+      sign * back->GetElement(axis, 0), sign * back->GetElement(axis, 1), sign * back->GetElement(axis, 2));
+    planes->AddItem(plane);
+  }
+  return planes;
+}
+
+}
+
+vtkDataSet* vtkHaliteImageVolumeRepresentation::Connect(vtkHaliteMapper* halite)
+{
+  // A client of a server that renders has no input.
+  if (!halite || this->VolumeMapper->GetNumberOfInputConnections(0) == 0)
+  {
+    return nullptr;
+  }
+  vtkDataObject* delivered = this->VolumeMapper->GetInputDataObject(0, 0);
+  vtkDataSet* grid = OnlyGrid(delivered);
+  if (grid && grid == delivered)
+  {
+    halite->SetInputConnection(this->VolumeMapper->GetInputConnection(0, 0));
+  }
+  else if (grid)
+  {
+    halite->SetInputData(grid);
+  }
+  else if (delivered && !this->Inner->HasWarned)
+  {
+    vtkWarningMacro(
+      "Halite draws one image or rectilinear grid, not several partitions: ParaView's own mapper draws these");
+    this->Inner->HasWarned = true;
+  }
+  return grid;
+}
+
+void vtkHaliteImageVolumeRepresentation::UpdateMapperParameters()
+{
+  Internals& inner = *this->Inner;
+  vtkHaliteMapper* halite = vtkHaliteMapper::SafeDownCast(this->GetActiveVolumeMapper());
+  const bool draws = this->Connect(halite) != nullptr;
+  inner.Volume->Prefer(draws ? halite : nullptr);
+  this->Superclass::UpdateMapperParameters();
+  if (!draws)
+  {
+    return;
+  }
+
+  std::string array;
+  int association = vtkDataObject::FIELD_ASSOCIATION_POINTS;
+  vtkInformation* info = this->GetInputArrayInformation(0);
+  if (info && info->Has(vtkDataObject::FIELD_NAME()) && info->Has(vtkDataObject::FIELD_ASSOCIATION()))
+  {
+    array = info->Get(vtkDataObject::FIELD_NAME());
+    association = info->Get(vtkDataObject::FIELD_ASSOCIATION());
+  }
+  halite->SelectScalarArray((this->UseSeparateOpacityArray ? array + "_and_opacity" : array).c_str());
+  halite->SetScalarMode(association == vtkDataObject::FIELD_ASSOCIATION_CELLS ? VTK_SCALAR_MODE_USE_CELL_FIELD_DATA
+      : association == vtkDataObject::FIELD_ASSOCIATION_NONE                  ? VTK_SCALAR_MODE_USE_FIELD_DATA
+                                                                              : VTK_SCALAR_MODE_USE_POINT_FIELD_DATA);
+
+  // The mapper has regions of its own, which are for the user.
+  vtkSmartPointer<vtkPlaneCollection> planes;
+  if (this->VolumeMapper->GetCropping())
+  {
+    std::array<double, 6> box;
+    for (std::size_t i = 0; i < 6; ++i)
+    {
+      box[i] = this->CroppingOrigin[i / 2] + this->DataBounds[i] * this->CroppingScale[i / 2];
+    }
+    vtkNew<vtkMatrix4x4> placement;
+    this->Actor->GetMatrix(placement);
+    planes = Around(box, placement);
+  }
+  halite->SetClippingPlanes(planes);
+
+  const std::string held = halite->GetTransfer2DYAxisArray() ? halite->GetTransfer2DYAxisArray() : "";
+  if (!inner.IsReplaced || held != inner.Replacement)
+  {
+    inner.OwnSecond = held;
+  }
+  inner.IsReplaced = this->UseTransfer2D && !this->UseGradientForTransfer2D;
+  inner.Replacement = this->ColorArray2Name;
+  const std::string& second = inner.IsReplaced ? inner.Replacement : inner.OwnSecond;
+  halite->SetTransfer2DYAxisArray(second.c_str());
+}
+
+void vtkHaliteImageVolumeRepresentation::PrintSelf(ostream& os, vtkIndent indent)
+{
+  this->Superclass::PrintSelf(os, indent);
+  os << indent << "Mapper: " << (this->Inner->IsChosen ? "Halite" : "ParaView's") << "\n";
+}
