@@ -9,7 +9,7 @@ from paraview import servermanager, simple
 from vtkmodules import vtkRenderingCore
 from vtkmodules.util import numpy_support
 
-sys.path.insert(0, os.environ["HALITE_TESTS"])
+sys.path.append(os.environ["HALITE_TESTS"])
 
 SIZE = (96, 80)
 
