@@ -177,6 +177,11 @@ struct Faces
       {
         // The number of faces; then of each, the number of points, and those.
         grid->GetFaceStream(cell, stream);
+        if (stream->GetNumberOfIds() == 0)
+        {
+          throw halite::Error("the grid has polyhedra, of which cell " + std::to_string(cell) +
+            " has no faces: whoever made or read it left these out");
+        }
         for (vtkIdType at = 1; at < stream->GetNumberOfIds();)
         {
           const vtkIdType end = at + 1 + stream->GetId(at);
