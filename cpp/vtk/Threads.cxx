@@ -8,6 +8,9 @@
 #ifdef __unix__
 #include <unistd.h>
 #endif
+#ifdef __linux__
+#include <sched.h>
+#endif
 
 namespace
 {
@@ -18,6 +21,21 @@ std::size_t Number(const char* variable)
   const char* text = std::getenv(variable);
   const long n = text ? std::strtol(text, nullptr, 10) : 0;
   return n > 0 ? static_cast<std::size_t>(n) : 0;
+}
+
+// A launcher may have bound the process to some of the node's.
+std::size_t CoresOfProcess()
+{
+#ifdef __linux__
+  cpu_set_t mine;
+  CPU_ZERO(&mine);
+  // It fails where there are more cores than the set has room for.
+  if (sched_getaffinity(0, sizeof mine, &mine) == 0)
+  {
+    return static_cast<std::size_t>(CPU_COUNT(&mine));
+  }
+#endif
+  return std::max(1u, std::thread::hardware_concurrency());
 }
 
 std::size_t CoresOfNode()
@@ -55,9 +73,7 @@ std::size_t Threads::Of(int asked)
   std::size_t threads = Number("HALITE_THREADS");
   if (threads == 0)
   {
-    // A launcher may have bound the process to its share already.
-    const std::size_t mine = std::max(1u, std::thread::hardware_concurrency());
-    threads = std::min(mine, std::max<std::size_t>(1, CoresOfNode() / Threads::ProcessesOfNode()));
+    threads = std::min(CoresOfProcess(), std::max<std::size_t>(1, CoresOfNode() / Threads::ProcessesOfNode()));
   }
   const std::size_t most = Number("VTK_SMP_MAX_THREADS");
   return std::min<std::size_t>(most > 0 ? std::min(threads, most) : threads, 1024);

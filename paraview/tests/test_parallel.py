@@ -2,6 +2,7 @@
 """Boxes in pieces on several ranks, under mpiexec: the pictures are those of one process."""
 import math
 import os
+import re
 import tempfile
 
 import session
@@ -60,6 +61,51 @@ def drawn(ends, views=((2.1, -1.7, 2.9), (-1.5, 2.4, -1.9)), also=lambda v: None
             # This rank has a part of the cells, and draws that.
             drawn_here = session.mapper_of(d).GetInputDataObject(0, 0).GetNumberOfCells()
             assert 0 < drawn_here < 64 * (len(ends) - 1), drawn_here
+        simple.Delete(reader)
+        simple.Delete(v)
+
+
+def images(folder, ends):
+    """A file that lists parts of an image of 8 x 4 x 4 voxels that fills the unit box, between these places along x."""
+    import test_images
+    whole = test_images.vtkCommonDataModel.vtkImageData()
+    whole.SetDimensions(9, 5, 5)
+    whole.SetSpacing(1 / 8, 1 / 4, 1 / 4)
+    path = os.path.join(folder, "parts.pvti")
+    with open(path, "w") as f:
+        f.write('<VTKFile type="PImageData" version="1.0"><PImageData WholeExtent="0 8 0 4 0 4" GhostLevel="0" Origin="0 0 0" '
+                'Spacing="0.125 0.25 0.25"><PPointData Scalars="s"><PDataArray type="Float64" Name="s"/></PPointData>')
+        for i, (a, b) in enumerate(zip(ends, ends[1:])):
+            part = test_images.vtkCommonDataModel.vtkImageData()
+            part.SetExtent(a, b, 0, 4, 0, 4)
+            part.SetSpacing(whole.GetSpacing())
+            test_images.valued(part, lambda p: p[:, 2], "s")
+            w = vtkIOXML.vtkXMLImageDataWriter()
+            w.SetFileName(os.path.join(folder, f"part{i}.vti"))
+            w.SetInputData(part)
+            w.Write()
+            f.write(f'<Piece Extent="{a} {b} 0 4 0 4" Source="part{i}.vti"/>')
+        f.write("</PImageData></VTKFile>")
+    return simple.XMLPartitionedImageDataReader(FileName=[path])
+
+
+def test_images():
+    import test_images
+    with tempfile.TemporaryDirectory() as folder:
+        v = session.view()
+        reader = images(folder, [0, 1, 4, 6, 8])
+        d = session.show(reader, v, color=COLOR, opacity=test_images.OPACITY)
+        for position in ((2.1, -1.7, 2.9), (-1.5, 2.4, -1.9)):
+            v.CameraPosition = position
+            worst = check(session.picture(v), session.truth(v, color=COLOR, opacity=test_images.OPACITY, slab=True),
+                          near=NEAR + math.log2(ranks()), what=f"images on {ranks()} ranks")
+            print(f"        {worst:.2f} of 255 apart")
+        mapper = session.mapper_of(d)
+        assert mapper.GetClassName() == "vtkHaliteMapper"
+        assert mapper.GetInputDataObject(0, 0).GetNumberOfCells() <= math.ceil(128 / ranks()) + 64
+        # Each rank has its share of the cores.
+        share = min(max(1, os.cpu_count() // ranks()), len(os.sched_getaffinity(0)))
+        assert re.search(rf"Adapter: .*\b{share} thread", str(mapper)), re.search("Adapter: .*", str(mapper))
         simple.Delete(reader)
         simple.Delete(v)
 
