@@ -139,6 +139,17 @@ def test_fewer_pixels_while_the_host_interacts():
     assert np.abs(pixels(w) - coarse).max() == 0
 
 
+def test_rounding_up():
+    v = volume(lattice(2, field=SLANT), WAVES, RAMP)
+    w, r = scene(v)
+    before = pixels(w)
+    v.GetMapper().SetRoundingUp(True)
+    more = pixels(w) - before
+    assert more.min() == 0 and more.max() == 1 and 0.2 < more[before > 0].mean() < 0.8
+    v.GetMapper().SetRoundingUp(False)
+    assert np.abs(pixels(w) - before).max() == 0
+
+
 def test_multi_block_mapper():
     from vtkmodules.vtkRenderingVolumeOpenGL2 import vtkMultiBlockUnstructuredGridVolumeMapper
     blocks = vtkCommonDataModel.vtkMultiBlockDataSet()

@@ -185,7 +185,7 @@ void vtkHaliteMapper::Internals::DrawIn(vtkOpenGLRenderWindow* window, vtkRender
       std::copy_n(this->Self.CroppingRegionPlanes, 6, planes.begin());
       view.Crop(planes, this->Self.CroppingRegionFlags, content.Placement);
     }
-    wanted << content.Whole() << view.Key;
+    wanted << content.Whole() << view.Key << static_cast<std::uint64_t>(this->Self.RoundingUp);
     if (this->Failed == wanted)
     {
       return;
@@ -351,6 +351,7 @@ void vtkHaliteMapper::PrintSelf(ostream& os, vtkIndent indent)
   os << indent << "ImageSampleDistance: " << this->ImageSampleDistance << "\n";
   os << indent << "InteractiveImageSampleDistance: " << this->InteractiveImageSampleDistance << "\n";
   os << indent << "Interacting: " << (this->Interacting ? "On" : "Off") << "\n";
+  os << indent << "RoundingUp: " << (this->RoundingUp ? "On" : "Off") << "\n";
   os << indent << "NumberOfThreads: " << this->NumberOfThreads << "\n";
   os << indent << "UseFloatingPointFrameBuffer: " << (this->UseFloatingPointFrameBuffer ? "On" : "Off") << "\n";
   os << indent << "PrepareTime: " << this->PrepareTime << "\n";

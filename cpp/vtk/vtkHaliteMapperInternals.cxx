@@ -252,6 +252,20 @@ bool vtkHaliteMapper::Internals::Draw(
   return finished && !this->IsReleased;
 }
 
+namespace
+{
+
+// Half a byte's step more of what is not 0.
+void RoundUp(std::vector<float>& pixels)
+{
+  for (float& value : pixels)
+  {
+    value = value > 0 ? std::min(value + 0.5f / 255, 1.0f) : value;
+  }
+}
+
+}
+
 bool vtkHaliteMapper::Internals::Show(
   const Content& content, SceneView& view, const Viewport& viewport, Presenter& presenter, Frame& frame)
 {
@@ -284,6 +298,10 @@ bool vtkHaliteMapper::Internals::Show(
   Clock clock(this->Self.PresentTime);
   if (!isDrawn)
   {
+    if (this->Self.RoundingUp)
+    {
+      RoundUp(this->Pixels);
+    }
     frame.Texture = presenter.Upload(width, height, this->Pixels);
   }
   presenter.Present(frame.Texture, viewport);

@@ -3,11 +3,11 @@
 
     pvbatch real.py HALITE.SO FOLDER OUT [--judge 'COMMAND {scene} {folder}'] [--cases NAME...]
 
-FOLDER has the files that CASES names, or legacy files beside them (.vtk), which are taken first: ParaView 5.11 does not read the faces of
-polyhedra as VTK's XML files have them since version 2.3. OUT gets a scene file and pictures of each. With a judge, a program that draws OUT/NAME.json as
-Halite's scene files describe it and leaves OUT/NAME.npy (rows from the top, premultiplied RGBA), errors are those against it, in 255ths, over
-black: the greatest, and the root of their mean square. The first image includes what a mapper's representation does to the grid; frames are
-medians of three views.
+FOLDER has the files that CASES names, or legacy files beside them (.vtk), which are taken first: ParaView 5.11 does not
+read the faces of polyhedra as VTK's XML files have them since version 2.3. OUT gets a scene file and pictures of each.
+With a judge, a program that draws OUT/NAME.json as Halite's scene files describe it and leaves OUT/NAME.npy (rows from
+the top, premultiplied RGBA), errors are those against it, in 255ths, over black: the greatest, and the root of their
+mean square. The first image includes what a mapper's representation does to the grid; frames are medians of three views.
 """
 import argparse
 import json
@@ -69,9 +69,10 @@ def drawn(source, mapper, association, name, camera, unit, color, opacity):
     d.SelectMapper = mapper
     d.SetRepresentationType("Volume")
     d.ColorArrayName = (association, name)
-    d.LookupTable = simple.CreateLookupTable(RGBPoints=[x for k in color for x in k], ColorSpace="RGB", ScalarRangeInitialized=1)
-    d.ScalarOpacityFunction = simple.CreatePiecewiseFunction(Points=[x for s, a in opacity for x in (s, a, 0.5, 0)],
-                                                             ScalarRangeInitialized=1)
+    d.LookupTable = simple.CreateLookupTable(
+        RGBPoints=[x for k in color for x in k], ColorSpace="RGB", ScalarRangeInitialized=1)
+    d.ScalarOpacityFunction = simple.CreatePiecewiseFunction(
+        Points=[x for s, a in opacity for x in (s, a, 0.5, 0)], ScalarRangeInitialized=1)
     d.ScalarOpacityUnitDistance = unit
     found = picture(v)
     first, frames = time.perf_counter() - start, []
@@ -94,13 +95,15 @@ def measure(case, folder, out, judge):
     reader.UpdatePipeline()
     information = reader.GetDataInformation()
     camera, unit = look(information.GetBounds())
-    array = (information.GetPointDataInformation if association == "POINTS" else information.GetCellDataInformation)().GetArrayInformation(name)
+    of_points = association == "POINTS"
+    arrays = information.GetPointDataInformation() if of_points else information.GetCellDataInformation()
+    array = arrays.GetArrayInformation(name)
     scale = lambda knots: [[low + (high - low) * k[0], *k[1:]] for k in knots]
     color, opacity = scale(COLOR), scale(OPACITY)
     is_image = path.endswith(".vti")
-    scene = {"mesh": path, "scalars": {"name": name, "association": {"POINTS": "point", "CELLS": "cell"}[association]}, "color": color,
-             "opacity": opacity, "unit_distance": unit, "convention": "opacity" if is_image else "extinction", "camera": camera,
-             "size": SIZE}
+    scene = {"mesh": path, "scalars": {"name": name, "association": "point" if of_points else "cell"}, "color": color,
+             "opacity": opacity, "unit_distance": unit, "convention": "opacity" if is_image else "extinction",
+             "camera": camera, "size": SIZE}
     if "polyhedra" in case:
         # What a judge cannot draw as it is, it may cut; in values of cells nothing depends on how.
         scene["cells"] = "tets"
@@ -110,7 +113,8 @@ def measure(case, folder, out, judge):
         json.dump(scene, f)
     truth = None
     if judge:
-        subprocess.run(shlex.split(judge.format(scene=os.path.join(out, case + ".json"), folder=out)), check=True, stdout=subprocess.DEVNULL)
+        command = shlex.split(judge.format(scene=os.path.join(out, case + ".json"), folder=out))
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         truth = 255 * np.load(os.path.join(out, case + ".npy"))[..., :3]
     for mapper in MAPPERS["UniformGridRepresentation" if is_image else "UnstructuredGridRepresentation"]:
         if mapper == "Resample To Image" and "polyhedra" in case:

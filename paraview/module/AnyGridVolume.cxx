@@ -4,6 +4,7 @@
 #include "vtkHaliteMapper.h"
 
 #include "vtkLODProp3D.h"
+#include "vtkMultiProcessController.h"
 #include "vtkObjectFactory.h"
 
 vtkStandardNewMacro(AnyGridVolume);
@@ -18,6 +19,12 @@ int AnyGridVolume::Done(int drawn)
 {
   this->EstimatedRenderTime = this->LODProp->GetEstimatedRenderTime();
   return drawn;
+}
+
+bool AnyGridVolume::IsBlendedWithOthers()
+{
+  vtkMultiProcessController* controller = vtkMultiProcessController::GetGlobalController();
+  return controller && controller->GetNumberOfProcesses() > 1;
 }
 
 void AnyGridVolume::SetMapper(vtkAbstractVolumeMapper* mapper)

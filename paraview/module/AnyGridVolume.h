@@ -16,6 +16,11 @@ public:
   vtkTypeMacro(AnyGridVolume, vtkPVLODVolume);
 
   /**
+   * Whether the pictures of several processes are blended, as bytes.
+   */
+  static bool IsBlendedWithOthers();
+
+  /**
    * This mapper takes the place of whichever is set, from the next SetMapper() on, until null takes its place. A change of mappers makes
    * a new volume, for which all would be drawn anew.
    */

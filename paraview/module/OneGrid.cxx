@@ -2,11 +2,17 @@
 #include "OneGrid.h"
 
 #include "vtkAppendFilter.h"
+#include "vtkCellArray.h"
+#include "vtkCellType.h"
 #include "vtkCompositeDataSet.h"
 #include "vtkDataSet.h"
 #include "vtkExtractBlockUsingDataAssembly.h"
+#include "vtkIdTypeArray.h"
 #include "vtkMergeBlocks.h"
+#include "vtkUnsignedCharArray.h"
 #include "vtkUnstructuredGrid.h"
+
+#include <cstring>
 
 namespace
 {
@@ -18,6 +24,23 @@ vtkUnstructuredGrid* Merged(vtkDataObject* blocks, vtkMergeBlocks* merge)
   merge->MergePointsOff();
   merge->Update();
   return vtkUnstructuredGrid::SafeDownCast(merge->GetOutputDataObject(0));
+}
+
+bool HasPolyhedra(vtkUnstructuredGrid* grid)
+{
+  vtkUnsignedCharArray* types = grid->GetCellTypesArray();
+  const auto count = types ? static_cast<std::size_t>(types->GetNumberOfValues()) : 0;
+  return count > 0 && std::memchr(types->GetPointer(0), VTK_POLYHEDRON, count);
+}
+
+// ParaView 5.11's reader of several pieces leaves arrays for faces of polyhedra, with anything in them, where there are no polyhedra.
+// What deals cells to ranks reads them.
+void DropFacesOfNothing(vtkUnstructuredGrid* grid)
+{
+  if ((grid->GetFaces() || grid->GetFaceLocations()) && !HasPolyhedra(grid))
+  {
+    grid->SetCells(grid->GetCellTypesArray(), grid->GetCells(), nullptr, nullptr);
+  }
 }
 
 }
@@ -65,6 +88,7 @@ vtkSmartPointer<vtkUnstructuredGrid> OneGrid::Of(vtkDataObject* input)
     append->Update();
     grid->ShallowCopy(append->GetOutput());
   }
+  DropFacesOfNothing(grid);
   if (grid->HasAnyGhostCells())
   {
     grid->RemoveGhostCells();

@@ -75,6 +75,7 @@ int vtkHaliteImageVolumeRepresentation::ProcessViewRequest(
   if (request == vtkPVView::REQUEST_RENDER() && this->Inner->Mapper)
   {
     this->Inner->Mapper->SetInteracting(inInfo->Has(vtkPVRenderView::USE_LOD()) != 0);
+    this->Inner->Mapper->SetRoundingUp(AnyGridVolume::IsBlendedWithOthers());
   }
   return this->Superclass::ProcessViewRequest(request, inInfo, outInfo);
 }

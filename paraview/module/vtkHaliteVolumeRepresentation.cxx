@@ -163,6 +163,7 @@ int vtkHaliteVolumeRepresentation::ProcessViewRequest(
     this->UpdateMapperParameters();
     const bool isInteracting = inInfo->Has(vtkPVRenderView::USE_LOD());
     mapper->SetInteracting(isInteracting);
+    mapper->SetRoundingUp(AnyGridVolume::IsBlendedWithOthers());
     this->Actor->SetEnableLOD(isInteracting && mapper->GetInteractiveImageSampleDistance() <= 0 ? 1 : 0);
     vtkAlgorithmOutput* producer = vtkPVRenderView::GetPieceProducer(inInfo, this);
     vtkDataSet* delivered =

@@ -36,7 +36,8 @@ try:
     display = simple.GetDisplayProperties(source, view)
     simple._DisableFirstRenderCameraReset()
     simple.Render(view)
-    found = dict(size=list(view.ViewSize), list=list(display.GetProperty("SelectMapper").GetAvailable()), chosen=display.GetProperty("SelectMapper").GetData())
+    mapper = display.GetProperty("SelectMapper")
+    found = dict(size=list(view.ViewSize), list=list(mapper.GetAvailable()), chosen=mapper.GetData())
 except BaseException:
     found = dict(error=traceback.format_exc())
 with open({found!r} + ".part", "w") as f:

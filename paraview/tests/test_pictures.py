@@ -84,6 +84,21 @@ def test_a_polyhedron():
     done(v)
 
 
+def test_faces_of_no_polyhedra_are_dropped():
+    """ParaView's reader of several pieces leaves such, and what deals cells to ranks would read them."""
+    g = lattice(2)
+    faces, places = vtkCommonCore.vtkIdTypeArray(), vtkCommonCore.vtkIdTypeArray()
+    for array in (faces, places):
+        array.SetNumberOfValues(8)
+        array.Fill(1 << 40)
+    g.SetCells(g.GetCellTypesArray(), g.GetCells(), places, faces)
+    assert g.GetFaces()
+    v, d, p = drawn(g)
+    check(p, session.truth(v, **ABOUT))
+    assert session.mapper_of(d).GetInputDataObject(0, 0).GetFaces() is None
+    done(v)
+
+
 def test_blocks_become_one_grid():
     blocks = vtkCommonDataModel.vtkMultiBlockDataSet()
     blocks.SetBlock(0, lattice(2, high=(1, 1, 0.5)))
@@ -218,6 +233,25 @@ def test_components_and_magnitude():
     d.LookupTable.VectorComponent = 0
     check(session.picture(v), session.truth(v, field=lambda q: 0.6 * q[..., 2], **ABOUT))
     done(v)
+
+
+def test_switching_representations_and_loading_again():
+    v, d, p = drawn(lattice(3, cells="mixed"))
+    for other in ("Surface", "Outline", "Wireframe"):
+        d.SetRepresentationType(other)
+        assert session.apart(session.picture(v), p) > 20, other
+        d.SetRepresentationType("Volume")
+        assert session.apart(session.picture(v), p) == 0, other
+    # A plugin that is loaded already changes nothing. ParaView reports a failure, as with plugins of its own.
+    simple.LoadPlugin(os.environ["HALITE_PLUGIN"], remote=False, ns=globals())
+    d.Visibility = 0
+    assert session.picture(v).max() == 0
+    d.Visibility = 1
+    assert session.apart(session.picture(v), p) == 0
+    w, e, q = drawn(lattice(3, cells="mixed"))
+    assert session.apart(q, p) == 0 and list(e.GetProperty("SelectMapper").GetAvailable()).count("Halite") == 1
+    done(v)
+    simple.Delete(w)
 
 
 def test_placement():

@@ -3,14 +3,17 @@
 import socket
 import subprocess
 import sys
+import tempfile
 import time
 
 import session
 
 from paraview import servermanager, simple
+from vtkmodules import vtkIOXML
 
+from boxes import check as near, lattice
 from runner import main
-from test_parallel import drawn
+from test_parallel import ABOUT, COLOR, OPACITY, drawn
 
 
 def free_port():
@@ -30,6 +33,19 @@ def test_the_server_draws():
 
     assert servermanager.ActiveConnection.IsRemote()
     drawn([0, 0.125, 0.25, 0.5, 1], also=check)
+
+
+def test_time_on_the_server():
+    steps = [lattice(3, cells="mixed", field=lambda p, k=k: p[:, 2] * (1 - 0.2 * k)) for k in range(3)]
+    with tempfile.TemporaryDirectory() as folder:
+        v = session.view()
+        reader = session.series(folder, vtkIOXML.vtkXMLUnstructuredGridWriter, "vtu", steps)
+        session.show(reader, v, color=COLOR, opacity=OPACITY)
+        for k in (0, 2, 1):
+            v.ViewTime = k
+            near(session.picture(v), session.truth(v, field=lambda q: q[..., 2] * (1 - 0.2 * k), **ABOUT), what=f"step {k}")
+        simple.Delete(reader)
+        simple.Delete(v)
 
 
 if __name__ == "__main__":
