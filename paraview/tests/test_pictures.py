@@ -235,6 +235,45 @@ def test_components_and_magnitude():
     done(v)
 
 
+def test_a_separate_array_for_opacities():
+    g = lattice(3, cells="mixed")
+    add(g, np.array([g.GetPoint(i)[0] for i in range(g.GetNumberOfPoints())]), "x")
+    v, d, _ = drawn(g)
+    d.OpacityArrayName, d.OpacityComponent = ("POINTS", "x"), ""
+    d.UseSeparateOpacityArray = 1
+    check(session.picture(v), session.truth(v, field=lambda q: q[..., 0], hue=lambda q: q[..., 2], steps=600, **ABOUT), near=2)
+    done(v)
+
+
+def test_what_the_colour_editor_does():
+    """Steps, logarithms, and a colour space of its own."""
+    v, d, p = drawn(lattice(3, cells="mixed", field=lambda q: 1 + 99 * q[:, 2]), mapper="Halite")
+    field = lambda q: 1 + 99 * q[..., 2]
+    ends = [(1, 0.1, 0.4, 0.9), (100, 1, 0.2, 0.1)]
+    opacity = [(1, 0.5), (30, 4), (50, 0), (100, 3)]
+    d.ScalarOpacityFunction.Points = [x for s, a in opacity for x in (s, a, 0.5, 0)]
+    table = d.LookupTable
+    table.RGBPoints = [x for k in ends for x in k]
+    mixed = lambda t: [a + (b - a) * t for a, b in zip(ends[0][1:], ends[1][1:])]
+    about = {"field": field, "opacity": opacity, "steps": 700}
+    check(session.picture(v), session.truth(v, color=ends, **about), what="plain")
+    # Four steps of equal width, each in the colour of its place from 0 to 1.
+    table.Discretize, table.NumberOfTableValues = 1, 4
+    steps = [(1 + 99 * (i + e) / 4, *mixed(i / 3)) for i in range(4) for e in (0, 1 - 1e-9)]
+    check(session.picture(v), session.truth(v, color=steps, **about), near=2, what="steps")
+    table.Discretize = 0
+    table.UseLogScale = 1
+    logarithmic = [(10 ** (2 * t), *mixed(t)) for t in np.linspace(0, 1, 400)]
+    check(session.picture(v), session.truth(v, color=logarithmic, **about), near=2, what="logarithms")
+    table.UseLogScale = 0
+    # Hues from red to blue are piecewise linear in RGB, by way of yellow, green and cyan.
+    table.RGBPoints, table.ColorSpace = [1, 1, 0, 0, 100, 0, 0, 1], "HSV"
+    hues = [(1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1)]
+    hues = [(1 + 99 * i / 4, *rgb) for i, rgb in enumerate(hues)]
+    check(session.picture(v), session.truth(v, color=hues, **about), what="hues")
+    done(v)
+
+
 def test_switching_representations_and_loading_again():
     v, d, p = drawn(lattice(3, cells="mixed"))
     for other in ("Surface", "Outline", "Wireframe"):
