@@ -7,8 +7,8 @@ import numpy as np
 from scene import *  # noqa: F403
 from test_pictures import RAMP, SLANT, WAVES
 
-# Large enough for events: the first comes 20 ms after a frame has begun.
-SIZE = 320
+# Large enough for events, three times at least: the first comes 20 ms after a frame has begun.
+SIZE = 640
 
 
 class Stage:
