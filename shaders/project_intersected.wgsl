@@ -124,7 +124,7 @@ fn longer(a: vec2f, b: vec2f) -> vec2f {
 /// Depths that are as good as none.
 const AT_EYE = 1e-18;
 
-/// Cells that rays pass on less than this of their longest edge are flat: of others nothing cancels.
+/// A cell is flat if rays pass through it over less than this share of its longest edge. Of thicker cells nothing cancels.
 const THIN = 0.25;
 
 /// Faces that are inclined less than this to the rays are taken for seen edge-on: where rays cross them f32 can't tell.
@@ -175,27 +175,10 @@ fn dotted(a: Twice, b: Twice) -> f32 {
     return whole.high.x;
 }
 
-/// The corners of a cell, or their values, but with corner `last` as the last, and turning the same way.
-fn corners_to(v: array<Twice, 4>, last: u32) -> array<Twice, 4> {
-    var to = v;
-    if last < 2u {
-        to = array<Twice, 4>(to[2], to[3], to[0], to[1]);
-    }
-    if (last & 1u) == 0u {
-        to = array<Twice, 4>(to[1], to[0], to[3], to[2]);
-    }
-    return to;
-}
-
-fn values_to(v: array<Value, 4>, last: u32) -> array<Value, 4> {
-    var to = v;
-    if last < 2u {
-        to = array<Value, 4>(to[2], to[3], to[0], to[1]);
-    }
-    if (last & 1u) == 0u {
-        to = array<Value, 4>(to[1], to[0], to[3], to[2]);
-    }
-    return to;
+/// The corners of a cell in a sequence that turns the same way and ends with corner `last`.
+fn ending_with(last: u32) -> vec4u {
+    let halves = select(vec4u(0u, 1u, 2u, 3u), vec4u(2u, 3u, 0u, 1u), last < 2u);
+    return select(halves, halves.yxwz, (last & 1u) == 0u);
 }
 
 fn write_record(i: u32, solid: Solid, own_values: array<Value, 4>, piece: u32, rank: u32) {
@@ -214,8 +197,11 @@ fn write_record(i: u32, solid: Solid, own_values: array<Value, 4>, piece: u32, r
     let shown = abs(dependency(p));
     let largest = greatest_of(shown);
     let last = select(select(select(3u, 2u, shown.z == largest), 1u, shown.y == largest), 0u, shown.x == largest);
-    let at = corners_to(solid.corners, last);
-    let v = values_to(own_values, last);
+    let to = ending_with(last);
+    var own = solid.corners;
+    let at = array<Twice, 4>(own[to.x], own[to.y], own[to.z], own[to.w]);
+    var given = own_values;
+    let v = array<Value, 4>(given[to.x], given[to.y], given[to.z], given[to.w]);
     let ab = added(at[1], negated(at[0]));
     let ac = added(at[2], negated(at[0]));
     let ad = added(at[3], negated(at[0]));
@@ -242,8 +228,8 @@ fn write_record(i: u32, solid: Solid, own_values: array<Value, 4>, piece: u32, r
     let down = fma(by_row(frame.ways), vec3f(t), by_row(frame.starts));
     let out = way.high * depth;
     let away = way_to(start, way, t, at[0]);
-    // Inward normals, but for the sign of the volume, of the faces opposite to each corner: of flat cells they are what
-    // rounding of edges leaves nothing of.
+    // Inward normals, but for the sign of the volume, of the faces opposite to each corner. They are pairs of floats: edges
+    // that are rounded to one float do not tell the normals of a flat cell.
     let normal_b = crossed(ac, ad);
     let normal_c = crossed(ad, ab);
     let normal_d = crossed(ab, ac);
@@ -300,7 +286,8 @@ fn write_record(i: u32, solid: Solid, own_values: array<Value, 4>, piece: u32, r
             facets[k] = vec4f(thickness * (edges / slopes.xyz), reference[k]);
             rise[k] = (rises[1] * of_b - rises[0] * of_c) / slopes.w;
         }
-        // On the reference, and from there: of that, what the division by depth makes of the first is taken off.
+        // The value where the pixel's ray meets the reference, and how values change from there. Fragments divide the change by
+        // the depth, so what that would add to the first value is taken off.
         let first = rise[0] / select(1.0, 1.0 + reference.x, PERSPECTIVE);
         let taken = select(Value(), first, PERSPECTIVE);
         middle += first;
@@ -308,11 +295,11 @@ fn write_record(i: u32, solid: Solid, own_values: array<Value, 4>, piece: u32, r
         to_below = rise[2] - taken * reference.z;
         towards_eye = -(rises[0] * slopes.y + rises[1] * slopes.z + rises[2] * slopes.w) / volume - taken;
     } else {
-        let own = array<Value, 3>(rises[0] / volume, rises[1] / volume, rises[2] / volume);
-        middle += own[0] * heights.y + own[1] * heights.z + own[2] * heights.w;
-        to_right = own[0] * across.y + own[1] * across.z + own[2] * across.w;
-        to_below = own[0] * along_rows.y + own[1] * along_rows.z + own[2] * along_rows.w;
-        towards_eye = -(own[0] * dot(out, n[1]) + own[1] * dot(out, n[2]) + own[2] * dot(out, n[3]));
+        let share = array<Value, 3>(rises[0] / volume, rises[1] / volume, rises[2] / volume);
+        middle += share[0] * heights.y + share[1] * heights.z + share[2] * heights.w;
+        to_right = share[0] * across.y + share[1] * across.z + share[2] * across.w;
+        to_below = share[0] * along_rows.y + share[1] * along_rows.z + share[2] * along_rows.w;
+        towards_eye = -(share[0] * dot(out, n[1]) + share[1] * dot(out, n[2]) + share[2] * dot(out, n[3]));
         facets = array<vec4f, 3>(heights / slopes, across / slopes, along_rows / slopes);
     }
     heights += ASIDE.x * across + ASIDE.y * along_rows;

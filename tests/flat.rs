@@ -17,7 +17,8 @@ const BOUND: f64 = 3e-4;
 
 const FLATNESS: [f64; 7] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-7, 1e-9];
 
-/// A mesh of side 2, bent in its own plane by what is not a grid; its third coordinate becomes `height` of it.
+/// A mesh of side 2, bent in its own plane so that its edges are no straight lines, and turned. Its third coordinate z becomes
+/// `height(z)`.
 fn squeezed(height: impl Fn(f64) -> f64, place: DVec3) -> Mesh {
     let turn = DMat3::from_rotation_x(0.9) * DMat3::from_rotation_z(0.4);
     draw::moved(&generate::tetrahedra(6), |p| {
@@ -40,7 +41,8 @@ fn views(place: DVec3) -> Vec<View> {
     views
 }
 
-/// Draws with the device's projection and with the walk on the CPU, by pairs of knots as long as cells are thick.
+/// Holds pictures of the device's projection to those of the walk on the CPU. `knots` are the opacities over the values' range, from 0 to 1,
+/// for each `unit` of length.
 fn compare(name: &str, mesh: &Mesh, values: Vec<f64>, place: DVec3, unit: f64, knots: &[(f64, f64)]) {
     let Some(mut renderer) = common::on_device(render::Engine::Project) else { return };
     let array = Array { name: "s".into(), components: 1, values: Values::F64(values) };

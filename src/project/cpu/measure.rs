@@ -16,8 +16,8 @@ const FEW_LINES: usize = 3;
 /// So many pieces of any fragments are integrated at a time.
 const ENOUGH: usize = 256;
 
-/// The fragments of a cell, block by block: v ([`super::setup`]) where the ray enters and leaves, the same for pixels that it
-/// passes by.
+/// The fragments of a cell, block by block: v ([`super::setup`]) where each pixel's ray enters and leaves. Both are 0 for a ray that
+/// misses the cell.
 #[derive(Debug)]
 pub(super) struct Fragments {
     pub(super) enter: [[f32; LANES]; BLOCKS],
