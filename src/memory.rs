@@ -1,4 +1,5 @@
-//! How much memory may still be had, asked before much of it is taken: an error then, and not the end of the process.
+//! How much memory may still be had, asked before much of it is taken: an error then, and not the end of the process. And a hint that
+//! some of it will be read soon.
 
 use crate::error::{Error, Result};
 use bytemuck::Zeroable;
@@ -138,6 +139,25 @@ pub fn available() -> Option<u64> {
 fn address_space(limits: &str) -> Option<u64> {
     let line = limits.lines().find_map(|line| line.strip_prefix("Max address space"))?;
     line.split_whitespace().next()?.parse().ok()
+}
+
+/// Has the memory of an item that may come next brought near.
+#[inline(always)]
+pub(crate) fn prefetch<T>(items: &[T], next: usize) {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(item) = items.get(next) {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        let first = std::ptr::from_ref(item).cast::<i8>();
+        for line in (0..size_of::<T>()).step_by(64) {
+            #[allow(unsafe_code, reason = "a hint")]
+            // SAFETY: it changes nothing, and the place is the item's.
+            unsafe {
+                _mm_prefetch::<_MM_HINT_T0>(first.add(line));
+            }
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (items, next);
 }
 
 #[cfg(test)]

@@ -253,15 +253,15 @@ impl Crossings {
     }
 }
 
-/// Where pixel (`i`, `j`) of a tile is in its arrays: blocks of 4 × 4 pixels lie together.
+/// Where pixel (`i`, `j`) of a tile is in its arrays: of four rows, column by column. So 4 × 4 pixels lie together from any column on.
 pub(crate) fn place(i: u32, j: u32) -> usize {
-    ((j / 4 * (TILE / 4) + i / 4) * 16 + j % 4 * 4 + i % 4) as usize
+    ((j / 4 * TILE + i) * 4 + j % 4) as usize
 }
 
 /// The column and row of a place in the arrays of a tile: the inverse of [`place`].
 pub(crate) fn pixel_at(place: usize) -> [u32; 2] {
-    let (block, within) = (place as u32 / 16, place as u32 % 16);
-    [block % (TILE / 4) * 4 + within % 4, block / (TILE / 4) * 4 + within / 4]
+    let (column, within) = (place as u32 / 4, place as u32 % 4);
+    [column % TILE, column / TILE * 4 + within]
 }
 
 #[cfg(test)]

@@ -10,6 +10,8 @@
 
 use crate::geometry::Geometry;
 use crate::view::View;
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, Simd, f32x4, i32x4};
 use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -19,6 +21,9 @@ pub(crate) const TILE: u32 = 32;
 
 /// Parts that cells are dealt out in: bits do not depend on the number of threads.
 const PARTS: usize = 64;
+
+/// Cells that are bounded by one thread at a time.
+const SOME: usize = 4096;
 
 /// Depth, in normalised units, in front of which nothing in perspective views is drawn.
 pub(crate) const NEAREST: f64 = 1e-7;
@@ -176,49 +181,7 @@ pub(crate) fn project(lens: &Lens, points: &[DVec3], places: &mut Vec<[f32; 2]>)
         .collect_into_vec(places);
 }
 
-/// The pixels whose centres the outline of a cell or face with these corners may hold.
-#[inline(always)]
-pub(crate) fn bounds<const K: usize>(
-    lens: &Lens,
-    points: &[DVec3],
-    places: &[[f32; 2]],
-    corners: [u32; K],
-) -> PixelBox {
-    let at = corners.map(|p| places[p as usize]);
-    let (mut low, mut high) = (at[0], at[0]);
-    for p in &at[1..] {
-        for k in 0..2 {
-            low[k] = if p[k] < low[k] { p[k] } else { low[k] };
-            high[k] = if p[k] > high[k] { p[k] } else { high[k] };
-        }
-    }
-    let sum: f32 = at.iter().map(|p| p[0]).sum();
-    if sum.is_nan() {
-        match clipped(lens, &corners.map(|p| points[p as usize])) {
-            Some(outline) => [low, high] = outline,
-            None => return NONE,
-        }
-    }
-    let mut pixels = NONE;
-    for k in 0..2 {
-        let end = (lens.size[k] - 1) as f32;
-        // Single floats round places far aside to thousandths of a pixel.
-        let first = (low[k] - 0.01 - low[k].abs() * 1e-6).max(0.0);
-        let last = (high[k] + 0.01 + high[k].abs() * 1e-6).min(end);
-        // Both are 0 at least, so the integer part is the floor.
-        let (first, last) = (first.min(65535.0), last.max(-1.0) + 1.0);
-        let whole = first as u32;
-        let first = whole + u32::from((whole as f32) < first);
-        if first >= last as u32 {
-            return NONE;
-        }
-        pixels[2 * k] = first as u16;
-        pixels[2 * k + 1] = (last as u32 - 1) as u16;
-    }
-    pixels
-}
-
-/// [`bounds`] of `n` cells or faces.
+/// Of each of `n` cells or faces with these corners the pixels whose centres its outline may hold.
 pub(crate) fn all_bounds<const K: usize>(
     lens: &Lens,
     points: &[DVec3],
@@ -227,7 +190,61 @@ pub(crate) fn all_bounds<const K: usize>(
     corners: impl Fn(usize) -> [u32; K] + Sync,
     boxes: &mut Vec<PixelBox>,
 ) {
-    (0..n).into_par_iter().with_min_len(4096).map(|i| bounds(lens, points, places, corners(i))).collect_into_vec(boxes);
+    let level = Level::new();
+    boxes.resize(n, NONE);
+    boxes.par_chunks_mut(SOME).enumerate().for_each(|(part, boxes)| {
+        fearless_simd::dispatch!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || {
+                for (i, pixels) in boxes.iter_mut().enumerate() {
+                    *pixels = bounds_of(simd, lens, points, places, corners(part * SOME + i));
+                }
+            }
+        ));
+    });
+}
+
+/// As [`all_bounds`], of one cell or face.
+pub(crate) fn bounds<const K: usize>(
+    lens: &Lens,
+    points: &[DVec3],
+    places: &[[f32; 2]],
+    corners: [u32; K],
+) -> PixelBox {
+    fearless_simd::dispatch!(Level::baseline(), simd => bounds_of(simd, lens, points, places, corners))
+}
+
+#[inline(always)]
+fn bounds_of<S: Simd, const K: usize>(
+    simd: S,
+    lens: &Lens,
+    points: &[DVec3],
+    places: &[[f32; 2]],
+    corners: [u32; K],
+) -> PixelBox {
+    // The least column and row, and the greatest, of which the sign is turned.
+    let both = |[x, y]: [f32; 2]| f32x4::load_array(simd, [x, y, -x, -y]);
+    let mut low = both(places[corners[0] as usize]);
+    let mut sum = low;
+    for &corner in &corners[1..] {
+        let at = both(places[corner as usize]);
+        (low, sum) = (low.min(at), sum + at);
+    }
+    if sum[0].is_nan() {
+        match clipped(lens, &corners.map(|p| points[p as usize])) {
+            Some([[left, top], [right, bottom]]) => low = f32x4::load_array(simd, [left, top, -right, -bottom]),
+            None => return NONE,
+        }
+    }
+    let [right, bottom] = lens.size.map(|n| (n - 1) as f32);
+    // Single floats round places far aside to thousandths of a pixel.
+    let low = low - 0.01 - low.abs() * 1e-6;
+    let whole = low.max(f32x4::load_array(simd, [0.0, 0.0, -right, -bottom])).ceil().min(f32x4::splat(simd, 65535.0));
+    let [left, top, right, bottom] = i32x4::truncate_from(whole).to_array();
+    if left + right > 0 || top + bottom > 0 {
+        return NONE;
+    }
+    [left as u16, -right as u16, top as u16, -bottom as u16]
 }
 
 /// Least and greatest places of what of a cell or face lies before the eye; none if nothing does.

@@ -1,22 +1,26 @@
 //! The projection on the CPU: cells are dealt to tiles of the image, ordered tile by tile, and swept from front to back with
 //! neighbouring pixels in vector lanes. Nothing is gathered: a cell's numbers are the same for all of its pixels.
 //!
-//! The stages: [`screen`] projects points and deals cells to tiles, [`setup`] makes records of a tile's cells, [`order`]
-//! finds their sequence, [`fine`] finds and checks their pixels, [`measure`] integrates. Each pixel checks that what it
+//! The stages: [`screen`] projects points and deals cells to tiles, [`setup`] makes records of a tile's cells, [`outline`] finds
+//! the pixels that they may cover, [`order`] their sequence, [`fine`] finds and checks their pixels, [`measure`] integrates. Each pixel checks that what it
 //! composites is the mesh along its ray, piece after piece; those where it is not are drawn again by the walk. So the
 //! picture is the walk's where the order fails.
 
+mod doubles;
+mod find;
 mod fine;
 mod flat;
 mod lanes;
 mod measure;
 mod order;
+mod outline;
 mod setup;
 #[cfg(test)]
 pub(crate) mod tests;
 
 use crate::geometry::{Geometry, Values};
 use crate::integral::Integral;
+use crate::memory::prefetch;
 use crate::order::crossings::Crossings;
 use crate::order::screen::{self, Dealt, Lens, PixelBox, TILE};
 use crate::traverse::cpu;
@@ -25,7 +29,7 @@ use fearless_simd::{Level, Simd};
 use fine::{Canvas, Flaw};
 use order::Order;
 use rayon::prelude::*;
-use setup::{Record, Scene};
+use setup::{Records, Scene};
 use std::ops::ControlFlow;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
@@ -35,6 +39,9 @@ const MOST_PIXELS: u32 = 1 << 15;
 
 /// The most points of a transfer function: 16 bits number the lines between them.
 const MOST_KNOTS: usize = u16::MAX as usize;
+
+/// So many cells before it is drawn, a cell's memory is brought near.
+const AHEAD: usize = 2;
 
 /// Of the pixels that the mesh covers, the share from which on the walk draws all of a frame again.
 const MOST_REDRAWN: f64 = 0.25;
@@ -48,7 +55,7 @@ pub(crate) struct Sweep {
     boxes: [Vec<PixelBox>; 2],
     /// The lines of the function that the values of cells are on; none while they are not known.
     lines: Vec<[u16; 2]>,
-    /// Memory of threads: zeros, one for each cell.
+    /// Memory of threads: zeros, one for each cell and one more.
     spare: Mutex<Vec<Vec<u32>>>,
     /// Tests have this done to the order of cells.
     #[cfg(test)]
@@ -84,7 +91,7 @@ pub(crate) struct Frame<'a, const N: usize> {
 
 /// What a thread draws tiles with.
 struct Worker<const N: usize> {
-    records: Vec<Record<N>>,
+    records: Records<N>,
     cells: Vec<u32>,
     faces: Vec<u32>,
     crossings: Crossings,
@@ -95,7 +102,7 @@ struct Worker<const N: usize> {
 impl<const N: usize> Worker<N> {
     fn new() -> Self {
         Worker {
-            records: vec![],
+            records: Records { all: vec![], blocks: vec![], around: vec![] },
             cells: vec![],
             faces: vec![],
             crossings: Crossings::default(),
@@ -251,9 +258,9 @@ impl Sweep {
         worker.cells.extend(cells.of(t));
         worker.faces.clear();
         worker.faces.extend(faces.of(t));
-        let fresh = || vec![0; scene.geometry.cells.len()];
+        let fresh = || vec![0; scene.geometry.cells.len() + 1];
         let mut place = self.spare.lock().ok().and_then(|mut s| s.pop()).unwrap_or_else(fresh);
-        if place.len() != scene.geometry.cells.len() {
+        if place.len() != scene.geometry.cells.len() + 1 {
             place = fresh();
         }
         #[cfg(test)]
@@ -330,9 +337,8 @@ fn sweep<S: Simd, const N: usize>(
     }
     crossings.sort();
     canvas.clear(scene, frame.view, crossings, corner);
-    records.clear();
     setup::set_up(simd, scene, cells, corner, records);
-    order.find(scene.geometry, records, cells, crossings, place);
+    order.find(records, cells, crossings, place);
     #[cfg(test)]
     if let Some(fault) = fault {
         let mut sequence = vec![];
@@ -340,15 +346,19 @@ fn sweep<S: Simd, const N: usize>(
             sequence.push(i);
         }
         fault.inject(&mut sequence);
-        return sequence.iter().for_each(|&i| canvas.draw(simd, scene, &frame.integral, crossings, &records[i]));
+        sequence.iter().for_each(|&i| canvas.draw(simd, scene, &frame.integral, crossings, records, i));
+        return canvas.flush(simd, scene, &frame.integral, crossings, records);
     }
     while let Some(i) = order.next() {
         if canvas.is_done() {
             break;
         }
-        cpu::prefetch(records, order.behind(i));
-        canvas.draw(simd, scene, &frame.integral, crossings, &records[i]);
+        if let Some(next) = order.after(AHEAD) {
+            prefetch(&records.all, next);
+        }
+        canvas.draw(simd, scene, &frame.integral, crossings, records, i);
     }
+    canvas.flush(simd, scene, &frame.integral, crossings, records);
 }
 
 /// Has the walk draw all of a frame.

@@ -10,6 +10,7 @@ use crate::geometry::{Geometry, Values};
 use crate::image::Image;
 use crate::integral::second::Second;
 use crate::integral::{Integral, Light};
+use crate::memory::prefetch;
 use crate::mesh::faces::BOUNDARY;
 use crate::real::Real;
 use crate::view::{Blend, View};
@@ -360,7 +361,7 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
         loop {
             self.counts.steps += 1;
             let c = cells.get(cell as usize)?;
-            prefetch(cells, c.neighbours);
+            c.neighbours.iter().for_each(|&n| prefetch(cells, n as usize));
             let apex = c.corners.iter().fold(ids[0] ^ ids[1] ^ ids[2], |x, p| x ^ p);
             let dropped = face.step(frame.project(points[apex as usize]));
             let left_behind = std::mem::replace(&mut ids[dropped], apex);
@@ -432,22 +433,6 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
         };
         std::array::from_fn(|k| Real::of((0..3).map(|i| f64::from(corners[i][k]) * weights[i]).sum::<f64>()))
     }
-}
-
-/// Has the memory of the cells that may come next brought near while it is decided which.
-#[inline(always)]
-pub(crate) fn prefetch<T>(cells: &[T], next: [u32; 4]) {
-    #[cfg(target_arch = "x86_64")]
-    for cell in next.iter().filter_map(|&n| cells.get(n as usize)) {
-        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        #[allow(unsafe_code, reason = "a hint")]
-        // SAFETY: it changes nothing, and the place is a cell's.
-        unsafe {
-            _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(cell).cast());
-        }
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    let _ = (cells, next);
 }
 
 fn is_close(weights: [f64; 3]) -> bool {

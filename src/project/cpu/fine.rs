@@ -4,35 +4,30 @@
 //! is outside the mesh, by its crossings of the boundary; at the end nothing of the mesh may be left. A pixel of which that is not
 //! true is flagged, and drawn again by other means. So the picture does not rest on the order of the cells.
 
-use super::lanes::{Floats, LANES};
-use super::measure::Fragments;
-use super::setup::{Look, Record, Scene};
+use super::find::Found;
+use super::lanes::LANES;
+use super::measure::Parts;
+use super::setup::{Look, Record, Records, Scene};
 use crate::integral::{Batch, Integral, Light};
-use crate::order::crossings::{Crossings, place};
+use crate::order::crossings::{Crossings, pixel_at, place};
 use crate::order::screen::{ASIDE, NEAREST, TILE};
 use crate::traverse::cpu::least_light;
 use crate::view::{Blend, View};
 use fearless_simd::Simd;
-use fearless_simd::prelude::*;
 
 pub(super) const PIXELS: usize = (TILE * TILE) as usize;
-/// Blocks of a tile, in a row and in all.
-pub(super) const ACROSS: usize = TILE as usize / 4;
-const ROWS: usize = TILE as usize / 4;
-pub(super) const BLOCKS: usize = PIXELS / LANES;
+/// Strips of a tile, of four rows.
+pub(super) const STRIPS: usize = TILE as usize / 4;
+/// Blocks side by side of a tile, in a strip and in all.
+const ACROSS: usize = TILE as usize / 4;
+const BLOCKS: usize = PIXELS / LANES;
 
 /// How far from the end of the last cell the next may begin, in keys, of 1 and of the key; and how much of the mesh may be missed
 /// in a gap.
-const SLACK: f32 = 2e-6;
+pub(super) const SLACK: f32 = 2e-6;
 
 /// After so many fragments it is looked for pixels that are done.
 const GLANCE: u64 = 4096;
-
-/// Columns and rows of the pixels of a block.
-pub(super) const ACROSS_BLOCK: [f32; LANES] =
-    [0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0];
-pub(super) const DOWN_BLOCK: [f32; LANES] =
-    [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 3.0];
 
 /// Why a pixel is drawn again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,71 +44,72 @@ pub(super) enum Flaw {
     Coarse,
 }
 
-/// The pixels of a tile, block by block.
+/// The pixels of a tile, by their [`place`].
 #[derive(Debug)]
 pub(super) struct Canvas<const N: usize> {
     /// Red, green, blue, transmittance.
-    pub(super) light: Box<[[[f32; LANES]; 4]; BLOCKS]>,
+    pub(super) light: Box<[[f32; PIXELS]; 4]>,
     pub(super) largest: Vec<[f32; N]>,
-    last: Box<[[f32; LANES]; BLOCKS]>,
-    limits: Box<[[[f32; LANES]; BLOCKS]; 2]>,
+    pub(super) last: Box<[f32; PIXELS]>,
+    limits: Box<[[f32; PIXELS]; 2]>,
     flaws: Box<[Flaw; PIXELS]>,
-    /// A bit for each block of a row through which light still comes.
-    alive: [u8; ROWS],
+    /// A bit for each column of a strip through which light still comes.
+    pub(super) alive: [u32; STRIPS],
     /// The number of fragments at which it is looked again for blocks that are done.
     glance: u64,
     corner: [u32; 2],
     /// The length of each pixel's ray for each unit of depth.
-    pub(super) stretch: Box<[[f32; LANES]; BLOCKS]>,
+    pub(super) stretch: Box<[f32; PIXELS]>,
     eye_inside: bool,
     /// The key of the nearest place that is drawn for sure.
     nearest: f64,
     pub(super) batch: Batch,
-    pub(super) found: Fragments,
+    pub(super) found: Found,
+    pub(super) parts: Parts,
     pub(super) fragments: u64,
 }
 
 impl<const N: usize> Canvas<N> {
     pub(super) fn new() -> Self {
         Canvas {
-            light: Box::new([[[0.0; LANES]; 4]; BLOCKS]),
+            light: Box::new([[0.0; PIXELS]; 4]),
             largest: vec![[0.0; N]; PIXELS],
-            last: Box::new([[0.0; LANES]; BLOCKS]),
-            limits: Box::new([[[0.0; LANES]; BLOCKS]; 2]),
+            last: Box::new([0.0; PIXELS]),
+            limits: Box::new([[0.0; PIXELS]; 2]),
             flaws: Box::new([Flaw::None; PIXELS]),
-            alive: [0; ROWS],
+            alive: [0; STRIPS],
             glance: 0,
             corner: [0; 2],
-            stretch: Box::new([[0.0; LANES]; BLOCKS]),
+            stretch: Box::new([0.0; PIXELS]),
             eye_inside: false,
             nearest: f64::NEG_INFINITY,
             batch: Batch::default(),
-            found: Fragments::default(),
+            found: Found::default(),
+            parts: Parts::default(),
             fragments: 0,
         }
     }
 
     /// Begins the tile whose first pixel is `corner`.
     pub(super) fn clear(&mut self, scene: &Scene<N>, view: &View, crossings: &Crossings, corner: [u32; 2]) {
-        self.light.fill([[0.0; LANES], [0.0; LANES], [0.0; LANES], [1.0; LANES]]);
+        for (channel, light) in self.light.iter_mut().zip([0.0, 0.0, 0.0, 1.0]) {
+            channel.fill(light);
+        }
         if scene.blend == Blend::Maximum {
             self.largest.fill([f32::NEG_INFINITY; N]);
         }
         self.flaws.fill(Flaw::None);
         let lens = scene.lens;
-        (self.alive, self.corner, self.eye_inside) = ([u8::MAX; ROWS], corner, lens.meet);
+        (self.alive, self.corner, self.eye_inside) = ([u32::MAX; STRIPS], corner, lens.meet);
         self.glance = self.fragments + GLANCE;
         self.nearest = if lens.meet { lens.key(4.0 * NEAREST) } else { f64::NEG_INFINITY };
         let [column, row] = corner.map(f64::from);
         let [c, x, y, xx, yy, xy] = lens.stretch(column + ASIDE.x, row + ASIDE.y).map(|v| v as f32);
-        for (block, stretch) in self.stretch.iter_mut().enumerate() {
-            let [left, top] = [block % ACROSS * 4, block / ACROSS * 4].map(|v| v as f32);
-            for l in 0..LANES {
-                let (i, j) = (left + ACROSS_BLOCK[l], top + DOWN_BLOCK[l]);
-                stretch[l] = (c + i * (x + i * xx + j * xy) + j * (y + j * yy)).sqrt();
-            }
+        for (at, stretch) in self.stretch.iter_mut().enumerate() {
+            let [i, j] = pixel_at(at).map(|v| v as f32);
+            *stretch = (c + i * (x + i * xx + j * xy) + j * (y + j * yy)).sqrt();
         }
-        self.last.as_flattened_mut().copy_from_slice(crossings.first());
+        self.last.copy_from_slice(crossings.first());
         if !lens.limited {
             return;
         }
@@ -121,23 +117,23 @@ impl<const N: usize> Canvas<N> {
             for i in 0..TILE.min(lens.size[0] - corner[0]) {
                 let at = place(i, j);
                 let [low, high] = lens.limits(scene.geometry, view, corner[0] + i, corner[1] + j);
-                self.limits[0][at / LANES][at % LANES] = low as f32;
-                self.limits[1][at / LANES][at % LANES] = high as f32;
+                (self.limits[0][at], self.limits[1][at]) = (low as f32, high as f32);
             }
         }
     }
 
     /// Whether no more light comes through any pixel.
     pub(super) fn is_done(&self) -> bool {
-        self.alive == [0; ROWS]
+        self.alive == [0; STRIPS]
     }
 
-    /// Whether light still comes through the block that holds this pixel.
+    /// Whether light still comes through this pixel or others of its column in the strip.
     fn lives(&self, at: usize) -> bool {
-        self.alive[at / LANES / ACROSS] >> (at / LANES % ACROSS) & 1 == 1
+        let [column, row] = pixel_at(at);
+        self.alive[row as usize / 4] >> column & 1 == 1
     }
 
-    /// Draws a cell.
+    /// Draws the cell of record `i`, or keeps its blocks until there are enough to [flush](Self::flush).
     #[inline(always)]
     pub(super) fn draw<S: Simd>(
         &mut self,
@@ -145,128 +141,75 @@ impl<const N: usize> Canvas<N> {
         scene: &Scene<N>,
         integral: &Integral,
         crossings: &Crossings,
-        r: &Record<N>,
+        records: &Records<N>,
+        i: usize,
     ) {
+        let r = &records.all[i];
         match r.look {
-            Look::Empty => return,
-            Look::Flat => return self.draw_flat(scene, integral, crossings, r),
-            Look::Seen | Look::Unseen => {}
+            Look::Seen | Look::Unseen => {
+                if !self.found.has_room(r) {
+                    self.flush(simd, scene, integral, crossings, records);
+                }
+                self.found.take(records, i);
+            }
+            Look::Flat => {
+                self.flush(simd, scene, integral, crossings, records);
+                self.draw_flat(scene, integral, crossings, r);
+            }
+            Look::Empty => {}
         }
-        self.found.count = 0;
-        match r.fronts {
-            0 => self.find::<S, 0>(simd, crossings, r),
-            1 => self.find::<S, 1>(simd, crossings, r),
-            2 => self.find::<S, 2>(simd, crossings, r),
-            3 => self.find::<S, 3>(simd, crossings, r),
-            _ => {}
-        }
-        if r.look == Look::Unseen || self.found.count == 0 {
-            return;
-        }
-        if scene.lens.limited {
-            self.found.limit(simd, &self.limits, r.key);
-        }
-        self.measure(simd, scene, integral, r);
-        self.fragments += u64::from(self.found.fragments);
-        if r.dark < f32::INFINITY {
-            self.doubt(r.dark);
-        }
+    }
+
+    /// Draws the blocks that were kept. One pass after the other goes through all of them: each is a short chain of operations, so that
+    /// several blocks are under way at a time.
+    #[inline(always)]
+    pub(super) fn flush<S: Simd>(
+        &mut self,
+        simd: S,
+        scene: &Scene<N>,
+        integral: &Integral,
+        crossings: &Crossings,
+        records: &Records<N>,
+    ) {
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                self.find(simd, crossings, records);
+                if scene.lens.limited {
+                    self.found.limit(simd, &self.limits, records);
+                }
+                self.measure(simd, scene, integral, records);
+            },
+        );
+        self.found.clear();
         if self.fragments >= self.glance {
             self.rest(least_light(integral.exact.direct), scene.blend);
         }
     }
 
-    /// Finds the pixels whose rays are inside a cell that has `FRONTS` faces turned to the eye, and checks that they were
-    /// outside until there. It takes no decision but for pixels that fail.
-    #[inline(always)]
-    fn find<S: Simd, const FRONTS: usize>(&mut self, simd: S, crossings: &Crossings, r: &Record<N>) {
-        simd.vectorize(
-            #[inline(always)]
-            || {
-                let of = |v: f32| Floats::splat(simd, v);
-                let load = |v: &[f32; LANES]| Floats::load_array_ref(simd, v);
-                // Written out: `map` of an array of vectors goes by way of memory.
-                let four = |v: [f32; 4]| [of(v[0]), of(v[1]), of(v[2]), of(v[3])];
-                let (start, slope, down) = (four(r.plane[0]), four(r.plane[1]), four(r.plane[2]));
-                let (base, ratio) = (of(r.key[0]), of(r.key[1]));
-                let slack = of(SLACK);
-                // The eye inside: from very near to it. What lies behind it is beyond what is infinitely far.
-                let eye = of(if r.kappa > 0.0 { -1e7 / (r.kappa * r.kappa) } else { f32::NEG_INFINITY });
-                let beyond = of(1.0 / r.kappa);
-                let [x0, x1, y0, y1] = r.pixels.map(usize::from);
-                let first_x = (load(&ACROSS_BLOCK) + ((x0 / 4 * 4) as f32 - r.at[0])) - r.rest[0];
-                let zero = of(0.0);
-                let (mut at, mut fragments) = (0, 0);
-                for by in y0 / 4..(y1 / 4 + 1).min(ROWS) {
-                    // Whole pixels first, which are exact.
-                    let y = (load(&DOWN_BLOCK) + ((4 * by) as f32 - r.at[1])) - r.rest[1];
-                    let row = |f: usize| y.mul_add(down[f], start[f]);
-                    let row = [row(0), row(1), row(2), row(3)];
-                    let blocks = self.alive[by];
-                    let mut next = first_x;
-                    for bx in x0 / 4..=x1 / 4 {
-                        let x = next;
-                        next += 4.0;
-                        if blocks >> bx & 1 == 0 {
-                            continue;
-                        }
-                        let block = (by * ACROSS + bx) % BLOCKS;
-                        let v = |f: usize| x.mul_add(slope[f], row[f]);
-                        let [a, b, c, d] = [v(0), v(1), v(2), v(3)];
-                        let (enter, leave) = match FRONTS {
-                            0 => (eye, a.min(b).min(c.min(d))),
-                            1 => (a, b.min(c).min(d)),
-                            2 => (a.max(b), c.min(d)),
-                            _ => (a.max(b).max(c), d),
-                        };
-                        let leave = leave.min(beyond);
-                        let inside = enter.simd_lt(leave);
-                        let last = load(&self.last[block]);
-                        let (key_in, key_out) = (ratio.mul_add(enter, base), ratio.mul_add(leave, base));
-                        let allowed = key_in.abs().mul_add(slack, slack);
-                        let apart = !(key_in - last).abs().simd_le(allowed) & inside;
-                        if apart.to_bitmask() != 0 {
-                            self.check_gaps(crossings, block, apart.to_bitmask(), last.to_array(), key_in.to_array());
-                        }
-                        // Not a selection from what was there: that would become a masked store, which some processors do slowly.
-                        let end = inside.select(key_out, of(f32::NEG_INFINITY));
-                        last.max(end).store_array(&mut self.last[block]);
-                        let pixels = inside.to_bitmask().count_ones();
-                        self.found.keep(at, block, inside.select(enter, zero), inside.select(leave, zero));
-                        at += usize::from(pixels > 0);
-                        fragments += pixels;
-                    }
-                }
-                (self.found.count, self.found.fragments) = (at, fragments);
-            },
-        );
-    }
-
-    /// Flags pixels through which too much light comes after a cell whose numbers f32 does not tell.
+    /// Flags pixels of the `i`-th block kept through which too much light comes after a cell whose numbers f32 does not tell.
     #[cold]
-    fn doubt(&mut self, dark: f32) {
-        for i in 0..self.found.count {
-            let block = self.found.block[i] as usize % BLOCKS;
-            for l in (0..LANES).filter(|l| self.found.enter[i][*l] < self.found.leave[i][*l]) {
-                let flaw = &mut self.flaws[LANES * block + l];
-                if *flaw == Flaw::None && self.light[block][3][l] > dark {
-                    *flaw = Flaw::Coarse;
-                }
+    pub(super) fn doubt(&mut self, i: usize, dark: f32) {
+        let at = self.found.place(i);
+        for l in self.found.pixels(i) {
+            if self.flaws[at + l] == Flaw::None && self.light[3][at + l] > dark {
+                self.flaws[at + l] = Flaw::Coarse;
             }
         }
     }
 
-    /// Forgets blocks of which no pixel lets light through.
+    /// Forgets columns of strips of which no pixel lets light through.
     #[cold]
     fn rest(&mut self, least: f32, blend: Blend) {
         self.glance = self.fragments + GLANCE;
         if blend == Blend::Maximum {
             return;
         }
-        for (row, alive) in self.light.chunks(ACROSS).zip(&mut self.alive) {
-            for (k, block) in row.iter().enumerate() {
-                let most = block[3].iter().fold(0.0, |most: f32, t| most.max(*t));
-                *alive &= !(u8::from(most < least) << k);
+        let (columns, _) = self.light[3].as_chunks::<4>();
+        for (strip, alive) in columns.chunks(TILE as usize).zip(&mut self.alive) {
+            for (k, column) in strip.iter().enumerate() {
+                let most = column.iter().fold(0.0, |most: f32, t| most.max(*t));
+                *alive &= !(u32::from(most < least) << k);
             }
         }
     }
@@ -299,13 +242,13 @@ impl<const N: usize> Canvas<N> {
             Some(table) => table.add(integral.exact, front[N - 1], back[N - 1], length, &mut light),
         }
         let [r, g, b] = light.color;
-        let own = &mut self.light[at / LANES];
-        (own[0][at % LANES], own[1][at % LANES], own[2][at % LANES], own[3][at % LANES]) = (r, g, b, light.through);
+        let all = [r, g, b, light.through];
+        self.light.iter_mut().zip(all).for_each(|(channel, v)| channel[at] = v);
     }
 
     /// Red, green, blue and transmittance of a pixel.
     fn light_at(&self, at: usize) -> [f32; 4] {
-        self.light[at / LANES].each_ref().map(|row| row[at % LANES])
+        self.light.each_ref().map(|channel| channel[at])
     }
 
     /// Draws a cell whose thickness f32 cannot tell, pixel by pixel in f64.
@@ -327,15 +270,15 @@ impl<const N: usize> Canvas<N> {
                 let Some([mut enter, mut leave]) = cell.depths(column, row) else { continue };
                 let key = |w: f64| lens.key(w) as f32;
                 let (key_in, key_out) = (key(enter), key(leave));
-                let last = &mut self.last[at / LANES][at % LANES];
+                let last = &mut self.last[at];
                 let from = std::mem::replace(last, last.max(key_out));
                 let apart = (key_in - from).abs();
                 if apart.is_nan() || apart > SLACK * (1.0 + key_in.abs()) {
                     self.check_gap(crossings, at, from, key_in);
                 }
                 if lens.limited {
-                    enter = enter.max(lens.depth(f64::from(self.limits[0][at / LANES][at % LANES])));
-                    leave = leave.min(lens.depth(f64::from(self.limits[1][at / LANES][at % LANES])));
+                    enter = enter.max(lens.depth(f64::from(self.limits[0][at])));
+                    leave = leave.min(lens.depth(f64::from(self.limits[1][at])));
                 }
                 if enter >= leave {
                     continue;
@@ -364,10 +307,15 @@ impl<const N: usize> Canvas<N> {
     /// [`Self::check_gap`] for some pixels of a block.
     #[cold]
     #[inline(never)]
-    fn check_gaps(&mut self, crossings: &Crossings, block: usize, lanes: u64, from: [f32; LANES], to: [f32; LANES]) {
-        (0..LANES)
-            .filter(|l| lanes >> l & 1 == 1)
-            .for_each(|l| self.check_gap(crossings, LANES * block + l, from[l], to[l]));
+    pub(super) fn check_gaps(
+        &mut self,
+        crossings: &Crossings,
+        at: usize,
+        lanes: u64,
+        from: [f32; LANES],
+        to: [f32; LANES],
+    ) {
+        (0..LANES).filter(|l| lanes >> l & 1 == 1).for_each(|l| self.check_gap(crossings, at + l, from[l], to[l]));
     }
 
     /// Flags a pixel unless the mesh is absent between two keys.
@@ -443,10 +391,11 @@ impl<const N: usize> Canvas<N> {
     /// Whether a pixel of a block is flawed, or may be at its end.
     fn is_doubtful(&self, block: usize, crossings: &Crossings, least: f32) -> bool {
         let range = LANES * block..LANES * (block + 1);
-        let (ends, light, flaws) = (&crossings.last()[range.clone()], &self.light[block][3], &self.flaws[range]);
+        let (ends, light) = (&crossings.last()[range.clone()], &self.light[3][range.clone()]);
+        let (last, flaws) = (&self.last[range.clone()], &self.flaws[range]);
         let mut doubtful = false;
         for l in 0..LANES {
-            let [missed, beyond] = end(self.last[block][l], ends[l]);
+            let [missed, beyond] = end(last[l], ends[l]);
             doubtful |= missed & (light[l] >= least) | beyond | (flaws[l] != Flaw::None);
         }
         doubtful
@@ -454,7 +403,7 @@ impl<const N: usize> Canvas<N> {
 
     /// Checks what is left of the mesh behind the last cell of a pixel.
     fn check_end(&mut self, crossings: &Crossings, at: usize, least: f32) {
-        let (last, place) = (self.last[at / LANES][at % LANES], crossings.last()[at]);
+        let (last, place) = (self.last[at], crossings.last()[at]);
         let [missed, beyond] = end(last, place);
         if missed && self.light_at(at)[3] >= least {
             self.check_gap(crossings, at, last, place);
@@ -463,6 +412,18 @@ impl<const N: usize> Canvas<N> {
             self.flaws[at] = Flaw::Boundary;
         }
     }
+}
+
+/// A block of these pixels, from place `at` on, which is at most `PIXELS - LANES`.
+#[inline(always)]
+pub(super) fn window(pixels: &[f32; PIXELS], at: usize) -> &[f32; LANES] {
+    pixels[at..].first_chunk().unwrap_or(&[0.0; LANES])
+}
+
+/// As [`window`].
+#[inline(always)]
+pub(super) fn window_mut(pixels: &mut [f32; PIXELS], at: usize) -> &mut [f32; LANES] {
+    &mut pixels[at..at + LANES].as_chunks_mut::<LANES>().0[0]
 }
 
 /// Whether the mesh goes on behind the end of the last cell, or that lies behind the end of the mesh.

@@ -2,9 +2,10 @@
 //! vector. A scalar's are integrated line by line of the transfer function and added to the pixels as they are; the rest, of any
 //! field and integral, one by one.
 
-use super::fine::{ACROSS, ACROSS_BLOCK, BLOCKS, Canvas, DOWN_BLOCK, PIXELS};
+use super::find::MOST_BLOCKS;
+use super::fine::{Canvas, PIXELS, window, window_mut};
 use super::lanes::{Floats, LANES, piece};
-use super::setup::{Record, Scene};
+use super::setup::{Record, Records, Scene};
 use crate::integral::{Exact, Integral};
 use crate::view::Blend;
 use fearless_simd::Simd;
@@ -16,70 +17,16 @@ const FEW_LINES: usize = 3;
 /// So many pieces of any fragments are integrated at a time.
 const ENOUGH: usize = 256;
 
-/// The fragments of a cell, block by block: v ([`super::setup`]) where each pixel's ray enters and leaves. Both are 0 for a ray that
-/// misses the cell.
-#[derive(Debug)]
-pub(super) struct Fragments {
-    pub(super) enter: [[f32; LANES]; BLOCKS],
-    pub(super) leave: [[f32; LANES]; BLOCKS],
-    pub(super) block: [u32; BLOCKS],
-    /// Blocks, and fragments.
-    pub(super) count: usize,
-    pub(super) fragments: u32,
-    parts: Vec<Part>,
-}
+/// Pieces of any fragments, in the order of their cells.
+pub(super) type Parts = Vec<Part>;
 
 /// A piece of any fragment: extinction and colour at both ends, length, pixel.
 #[derive(Debug, Clone, Copy, Default)]
-struct Part {
+pub(super) struct Part {
     front: [f32; 4],
     back: [f32; 4],
     length: f32,
     pixel: usize,
-}
-
-impl Default for Fragments {
-    fn default() -> Self {
-        let none = [[0.0; LANES]; BLOCKS];
-        Fragments { enter: none, leave: none, block: [0; BLOCKS], count: 0, fragments: 0, parts: vec![] }
-    }
-}
-
-impl Fragments {
-    /// Keeps a block as the one with number `at`.
-    #[inline(always)]
-    pub(super) fn keep<S: Simd>(&mut self, at: usize, block: usize, enter: Floats<S>, leave: Floats<S>) {
-        let at = at % BLOCKS;
-        enter.store_array(&mut self.enter[at]);
-        leave.store_array(&mut self.leave[at]);
-        self.block[at] = block as u32;
-    }
-
-    /// Cuts off what lies outside the keys `limits` of each pixel.
-    #[inline(always)]
-    pub(super) fn limit<S: Simd>(
-        &mut self,
-        simd: S,
-        limits: &[[[f32; LANES]; BLOCKS]; 2],
-        [base, _, inverse]: [f32; 3],
-    ) {
-        let zero = Floats::splat(simd, 0.0);
-        self.fragments = 0;
-        for i in 0..self.count.min(BLOCKS) {
-            let [low, high] = [0, 1].map(|k| {
-                let limit = Floats::load_array_ref(simd, &limits[k][self.block[i] as usize % BLOCKS]);
-                (limit - base) * inverse
-            });
-            let (enter, leave) =
-                (Floats::load_array_ref(simd, &self.enter[i]), Floats::load_array_ref(simd, &self.leave[i]));
-            let inside = enter.simd_lt(leave);
-            let (enter, leave) = (enter.max(low), leave.min(high));
-            let inside = inside & enter.simd_lt(leave);
-            self.fragments += inside.to_bitmask().count_ones();
-            inside.select(enter, zero).store_array(&mut self.enter[i]);
-            inside.select(leave, zero).store_array(&mut self.leave[i]);
-        }
-    }
 }
 
 /// What vectors of fragments emit and absorb: red, green and blue, and opacity.
@@ -109,78 +56,89 @@ fn lit<S: Simd, const N: usize>(
 }
 
 impl<const N: usize> Canvas<N> {
-    /// Adds what the fragments found of a cell emit and absorb.
+    /// Adds what the fragments found emit and absorb.
     #[inline(always)]
-    pub(super) fn measure<S: Simd>(&mut self, simd: S, scene: &Scene<N>, integral: &Integral, r: &Record<N>) {
-        let exact = integral.table.is_none() && scene.blend == Blend::Composite;
-        simd.vectorize(
-            #[inline(always)]
-            || match (N, exact) {
-                (1, true) => self.scalars(simd, scene, integral.exact, r),
-                _ => self.any(simd, scene, integral, r),
-            },
-        );
-    }
-
-    /// Depths beyond R's at which the fragments of the `i`-th block begin and end, their lengths (0 where there is none), and x and y
-    /// from R.
-    #[inline(always)]
-    fn spans<S: Simd>(&self, simd: S, r: &Record<N>, i: usize) -> [Floats<S>; 5] {
-        let one = Floats::splat(simd, 1.0);
-        let (found, block) = (&self.found, self.found.block[i] as usize % BLOCKS);
-        let load = |v: &[f32; LANES]| Floats::load_array_ref(simd, v);
-        let (enter, leave) = (load(&found.enter[i]), load(&found.leave[i]));
-        let kappa = Floats::splat(simd, r.kappa);
-        let (p, q) = (one - kappa * enter, one - kappa * leave);
-        let over = one / (p * q);
-        let (first, second) = (enter * q * over, leave * p * over);
-        let length = (leave - enter) * over * load(&self.stretch[block]);
-        // Whole pixels first, which are exact.
-        let (left, top) = ((block % ACROSS * 4) as f32 - r.at[0], (block / ACROSS * 4) as f32 - r.at[1]);
-        [first, second, length, (load(&ACROSS_BLOCK) + left) - r.rest[0], (load(&DOWN_BLOCK) + top) - r.rest[1]]
-    }
-
-    /// Adds fragments of a scalar.
-    #[inline(always)]
-    fn scalars<S: Simd>(&mut self, simd: S, scene: &Scene<N>, exact: &Exact<f32>, r: &Record<N>) {
-        let of = |v: f32| Floats::splat(simd, v);
-        let [s, gx, gy, gz] = r.field[0];
-        let (low, high) = (of(r.span[0][0]), of(r.span[0][1]));
-        let lines = r.lines.map(usize::from);
-        for i in 0..self.found.count.min(BLOCKS) {
-            let [first, second, length, x, y] = self.spans(simd, r, i);
-            let side = x.mul_add(of(gx), y * gy);
-            let (base, along) = (side + s, side.mul_add(of(r.kappa), of(gz)));
-            let ends = [first, second].map(|t| t.mul_add(along, base).max(low).min(high));
-            let (color, alpha) = if lines[0] == lines[1] {
-                lit(simd, scene, exact, lines[0], ends, length)
-            } else {
-                on_lines(simd, scene, exact, lines, ends, length)
-            };
-            let light = &mut self.light[self.found.block[i] as usize % BLOCKS];
-            let transmittance = Floats::load_array_ref(simd, &light[3]);
-            for k in 0..3 {
-                let sum = transmittance.mul_add(color[k], Floats::load_array_ref(simd, &light[k]));
-                sum.store_array(&mut light[k]);
-            }
-            (-transmittance).mul_add(alpha, transmittance).store_array(&mut light[3]);
+    pub(super) fn measure<S: Simd>(&mut self, simd: S, scene: &Scene<N>, integral: &Integral, records: &Records<N>) {
+        if N == 1 && integral.table.is_none() && scene.blend == Blend::Composite {
+            self.find_values(simd, records);
+            return self.add_scalars(simd, scene, integral.exact, records);
         }
-    }
-
-    /// Any field and integral, fragment by fragment.
-    #[inline(always)]
-    fn any<S: Simd>(&mut self, simd: S, scene: &Scene<N>, integral: &Integral, r: &Record<N>) {
-        for i in 0..self.found.count.min(BLOCKS) {
-            let spans = self.spans(simd, r, i).map(Floats::to_array);
-            self.split(scene, integral, r, i, &spans);
-            if self.found.parts.len() > ENOUGH {
+        for i in 0..self.found.count.min(MOST_BLOCKS) {
+            let r = self.found.record(records, i);
+            let [x, y] = self.found.pixels_from(simd, r, i);
+            let [first, second, length] = self.span(simd, r, i);
+            length.store_array(&mut self.found.length[i]);
+            let ends = [&self.found.enter[i], &self.found.leave[i]].map(|v| Floats::load_array_ref(simd, v));
+            let fragments = ends[0].simd_lt(ends[1]).to_bitmask();
+            self.split(scene, integral, r, i, fragments, &[first, second, length, x, y].map(Floats::to_array));
+            if self.parts.len() > ENOUGH || r.dark < f32::INFINITY {
                 self.integrate_parts(simd, integral.exact.direct);
+            }
+            if r.dark < f32::INFINITY {
+                self.doubt(i, r.dark);
             }
         }
         self.integrate_parts(simd, integral.exact.direct);
     }
 
-    /// Splits the fragments of the `i`-th block into pieces, or adds what they are to their pixels where that is not a sum of pieces.
+    /// Depths beyond R's at which the fragments of the `i`-th block begin and end, and their lengths.
+    #[inline(always)]
+    fn span<S: Simd>(&self, simd: S, r: &Record<N>, i: usize) -> [Floats<S>; 3] {
+        let load = |v: &[f32; LANES]| Floats::load_array_ref(simd, v);
+        let one = Floats::splat(simd, 1.0);
+        let (enter, leave) = (load(&self.found.enter[i]), load(&self.found.leave[i]));
+        let (p, q) = (one - enter * r.kappa, one - leave * r.kappa);
+        let over = one / (p * q);
+        let stretch = load(window(&self.stretch, self.found.place(i)));
+        [enter * q * over, leave * p * over, (leave - enter) * over * stretch]
+    }
+
+    /// Finds the values of a scalar where the fragments begin and end, and their lengths.
+    #[inline(always)]
+    fn find_values<S: Simd>(&mut self, simd: S, records: &Records<N>) {
+        for i in 0..self.found.count.min(MOST_BLOCKS) {
+            let r = self.found.record(records, i);
+            let [first, second, length] = self.span(simd, r, i);
+            let [x, y] = self.found.pixels_from(simd, r, i);
+            let [s, gx, gy, gz] = r.field[0];
+            let side = x * gx + y * gy;
+            let (base, along) = (side + s, side * r.kappa + gz);
+            let value = |t: Floats<S>| (t.mul_add(along, base)).max(Floats::splat(simd, r.span[0][0]));
+            let value = |t: Floats<S>| value(t).min(Floats::splat(simd, r.span[0][1]));
+            value(first).store_array(&mut self.found.enter[i]);
+            value(second).store_array(&mut self.found.leave[i]);
+            length.store_array(&mut self.found.length[i]);
+        }
+    }
+
+    /// Adds fragments of a scalar, of which the values are found.
+    #[inline(always)]
+    fn add_scalars<S: Simd>(&mut self, simd: S, scene: &Scene<N>, exact: &Exact<f32>, records: &Records<N>) {
+        let load = |v: &[f32; LANES]| Floats::load_array_ref(simd, v);
+        for i in 0..self.found.count.min(MOST_BLOCKS) {
+            let r = self.found.record(records, i);
+            let (front, back, length) =
+                (load(&self.found.enter[i]), load(&self.found.leave[i]), load(&self.found.length[i]));
+            let lines = r.lines.map(usize::from);
+            let (color, alpha) = if lines[0] == lines[1] {
+                lit(simd, scene, exact, lines[0], [front, back], length)
+            } else {
+                on_lines(simd, scene, exact, lines, [front, back], length)
+            };
+            let at = self.found.place(i);
+            let transmittance = load(window(&self.light[3], at));
+            for k in 0..3 {
+                let light = window_mut(&mut self.light[k], at);
+                transmittance.mul_add(color[k], load(light)).store_array(light);
+            }
+            (-transmittance).mul_add(alpha, transmittance).store_array(window_mut(&mut self.light[3], at));
+            if r.dark < f32::INFINITY {
+                self.doubt(i, r.dark);
+            }
+        }
+    }
+
+    /// Splits fragments of a block into pieces, or adds what they are to their pixels where that is not a sum of pieces.
     #[inline(never)]
     fn split(
         &mut self,
@@ -188,12 +146,11 @@ impl<const N: usize> Canvas<N> {
         integral: &Integral,
         r: &Record<N>,
         i: usize,
+        fragments: u64,
         [first, second, length, x, y]: &[[f32; LANES]; 5],
     ) {
-        for l in 0..LANES {
-            if self.found.enter[i][l] >= self.found.leave[i][l] {
-                continue;
-            }
+        let at = self.found.place(i);
+        for l in (0..LANES).filter(|l| fragments >> l & 1 == 1) {
             let value = |t: f32| {
                 std::array::from_fn(|n| {
                     let [s, gx, gy, gz] = r.field[n];
@@ -201,22 +158,22 @@ impl<const N: usize> Canvas<N> {
                     (s + side + t * (gz + r.kappa * side)).max(r.span[n][0]).min(r.span[n][1])
                 })
             };
-            let pixel = (self.found.block[i] as usize * LANES + l) % PIXELS;
+            let pixel = (at + l) % PIXELS;
             let (front, back): ([f32; N], [f32; N]) = (value(first[l]), value(second[l]));
             if integral.table.is_some() || scene.blend == Blend::Maximum {
                 self.gather(scene.blend, integral, pixel, &front, &back, length[l]);
                 continue;
             }
             integral.exact.for_each_piece(&front, &back, |front, back, share| {
-                self.found.parts.push(Part { front, back, length: share * length[l], pixel });
+                self.parts.push(Part { front, back, length: share * length[l], pixel });
             });
         }
     }
 
     /// Integrates pieces of any fragments, and adds them to their pixels, in order.
     #[inline(always)]
-    fn integrate_parts<S: Simd>(&mut self, simd: S, direct: bool) {
-        for parts in self.found.parts.chunks(LANES) {
+    pub(super) fn integrate_parts<S: Simd>(&mut self, simd: S, direct: bool) {
+        for parts in self.parts.chunks(LANES) {
             let mut some = [Part::default(); LANES];
             some[..parts.len()].copy_from_slice(parts);
             let (front, back) = (columns(simd, some.map(|p| p.front)), columns(simd, some.map(|p| p.back)));
@@ -227,14 +184,13 @@ impl<const N: usize> Canvas<N> {
             let lit = [color(1), color(2), color(3), -alpha].map(Floats::to_array);
             for (l, part) in parts.iter().enumerate() {
                 let pixel = part.pixel % PIXELS;
-                let light = &mut self.light[pixel / LANES];
-                let transmittance = light[3][pixel % LANES];
+                let transmittance = self.light[3][pixel];
                 for k in 0..4 {
-                    light[k][pixel % LANES] += transmittance * lit[k][l];
+                    self.light[k][pixel] += transmittance * lit[k][l];
                 }
             }
         }
-        self.found.parts.clear();
+        self.parts.clear();
     }
 }
 

@@ -14,12 +14,15 @@
 //!
 //! Parallel views are the same with e_k = Δh, 1 for w_R, κ = 0, c = S.z and V = V_R + v.
 
-use crate::geometry::{Geometry, Values};
+use super::doubles::{by_cell, cross, guard, single, singles, terms, turn, wide};
+use super::outline::{Blocks, add_blocks};
+use crate::geometry::{Cell, Geometry, Values};
 use crate::integral::Exact;
-use crate::order::screen::{ASIDE, Lens, PixelBox, TILE};
+use crate::memory::prefetch;
+use crate::order::screen::{ASIDE, Lens, NEAREST, PixelBox, TILE};
 use crate::view::Blend;
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x4, f32x8, f64x8, u8x16};
+use fearless_simd::{Simd, f32x4, f32x8, f64x8, i32x8, u8x16};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -47,7 +50,10 @@ const STEEP: f32 = 0.25;
 pub(super) const UNSEEN: [u16; 2] = [1, 0];
 
 /// Cells that are set up at a time: as wide as the widest instructions, and others do it in parts.
-const EIGHT: usize = 8;
+pub(super) const EIGHT: usize = 8;
+
+/// The last column or row of a tile.
+const MOST: u16 = TILE as u16 - 1;
 
 /// Cells that are read together, so that memory has many of them to find at a time.
 const TOGETHER: usize = 32;
@@ -63,8 +69,10 @@ pub(super) struct Record<const N: usize> {
     pub(super) rest: [f32; 2],
     /// 1/w_R, or 0.
     pub(super) kappa: f32,
-    /// V_R, (w₀/w_R)², and one over that.
-    pub(super) key: [f32; 3],
+    /// v beyond which the ray is behind the eye.
+    pub(super) end: f32,
+    /// V_R, (w₀/w_R)².
+    pub(super) key: [f32; 2],
     /// s_R, w_R (g.x, g.y), g.z.
     pub(super) field: [[f32; 4]; N],
     /// Least and greatest value.
@@ -81,8 +89,20 @@ pub(super) struct Record<const N: usize> {
     pub(super) dark: f32,
     /// First and last interval of the transfer function (scalar fields).
     pub(super) lines: [u16; 2],
+    /// Where its blocks begin in the tile's, and how many they are.
+    pub(super) first_block: u32,
+    pub(super) blocks: u8,
     /// Index into the mesh.
     pub(super) cell: u32,
+}
+
+/// The cells of a tile, and their blocks: bytes, and some more at the end.
+#[derive(Debug)]
+pub(super) struct Records<const N: usize> {
+    pub(super) all: Vec<Record<N>>,
+    pub(super) blocks: Blocks,
+    /// The neighbours of each.
+    pub(super) around: Vec<[u32; 4]>,
 }
 
 /// What of a cell is drawn.
@@ -193,15 +213,6 @@ impl<const N: usize> Scene<'_, N> {
     }
 }
 
-type Triple<S> = [f64x8<S>; 3];
-
-/// The cross product. (Closures that are called more than once need not become part of their caller, where alone the vector
-/// instructions are known.)
-#[inline(always)]
-fn cross<S: Simd>(a: Triple<S>, b: Triple<S>) -> Triple<S> {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
 /// Puts the first corner, relative to the lens's origin, and the edges from there into lane `l`.
 #[inline(always)]
 fn relative(lens: &Lens, p: &[DVec3; 4], l: usize, from: &mut [[f64; EIGHT]; 3], edge: &mut [[[f64; EIGHT]; 3]; 3]) {
@@ -213,84 +224,32 @@ fn relative(lens: &Lens, p: &[DVec3; 4], l: usize, from: &mut [[f64; EIGHT]; 3],
     }
 }
 
-/// `rows` times the vectors.
-#[inline(always)]
-fn turn<S: Simd>(simd: S, rows: &[DVec3; 3], d: &[[f64; EIGHT]; 3]) -> Triple<S> {
-    let (x, y, z) =
-        (f64x8::load_array_ref(simd, &d[0]), f64x8::load_array_ref(simd, &d[1]), f64x8::load_array_ref(simd, &d[2]));
-    let [a, b, c] = rows;
-    [
-        x.mul_add(f64x8::splat(simd, a.x), y.mul_add(f64x8::splat(simd, a.y), z * a.z)),
-        x.mul_add(f64x8::splat(simd, b.x), y.mul_add(f64x8::splat(simd, b.y), z * b.z)),
-        x.mul_add(f64x8::splat(simd, c.x), y.mul_add(f64x8::splat(simd, c.y), z * c.z)),
-    ]
-}
-
-/// Never 0, of the sign of `v`.
-#[inline(always)]
-fn guard<S: Simd>(v: f64x8<S>, scale: f64x8<S>) -> f64x8<S> {
-    v.abs().max(scale * 1e-12 + 1e-280).copysign(v)
-}
-
-/// What two products may be off by.
-#[inline(always)]
-fn terms<S: Simd>(p: Triple<S>, r: Triple<S>) -> f64x8<S> {
-    (p[0] * r[1]).abs() + (p[1] * r[0]).abs()
-}
-
-/// Single floats as doubles.
-#[inline(always)]
-fn wide<S: Simd>(simd: S, v: [f32; EIGHT]) -> f64x8<S> {
-    let mut all = [0.0; EIGHT];
-    for (to, v) in all.iter_mut().zip(v) {
-        *to = f64::from(v);
-    }
-    f64x8::load_array(simd, all)
-}
-
-/// As single floats.
-#[inline(always)]
-fn single<S: Simd>(simd: S, v: f64x8<S>) -> f32x8<S> {
-    let mut all = [0.0; EIGHT];
-    for (to, v) in all.iter_mut().zip(v.to_array()) {
-        *to = v as f32;
-    }
-    f32x8::load_array(simd, all)
-}
-
-/// Four numbers of each cell, cell by cell.
-#[inline(always)]
-fn by_cell<S: Simd>(simd: S, [a, b, c, d]: [f32x8<S>; 4]) -> [[f32; 4]; EIGHT] {
-    let (a, b, c, d) = (a.split(), b.split(), c.split(), d.split());
-    let mut all = [[0.0; 16]; 2];
-    simd.store_four_interleaved_f32x4([a.0, b.0, c.0, d.0], &mut all[0]);
-    simd.store_four_interleaved_f32x4([a.1, b.1, c.1, d.1], &mut all[1]);
-    let mut rows = [[0.0; 4]; EIGHT];
-    rows.as_flattened_mut().copy_from_slice(all.as_flattened());
-    rows
-}
-
-/// As [`by_cell`], of doubles.
-#[inline(always)]
-fn singles<S: Simd>(simd: S, v: [f64x8<S>; 4]) -> [[f32; 4]; EIGHT] {
-    by_cell(simd, [single(simd, v[0]), single(simd, v[1]), single(simd, v[2]), single(simd, v[3])])
-}
-
-/// Appends the records of cells that meet the tile whose first pixel is `corner`.
+/// Makes the records of cells that meet the tile whose first pixel is `corner`.
 #[inline(always)]
 pub(super) fn set_up<S: Simd, const N: usize>(
     simd: S,
     scene: &Scene<N>,
     cells: &[u32],
     corner: [u32; 2],
-    records: &mut Vec<Record<N>>,
+    records: &mut Records<N>,
 ) {
     let mut read = [Read { corners: [DVec3::ZERO; 4], values: [[0.0; N]; 4] }; TOGETHER];
-    for some in cells.chunks(TOGETHER) {
+    records.all.clear();
+    records.blocks.clear();
+    records.around.clear();
+    let geometry = scene.geometry;
+    for (part, some) in cells.chunks(TOGETHER).enumerate() {
+        // Where memory is slow the cells of the part after the next are on their way, and the points of the next.
+        let coming = |k: usize| cells.iter().skip((part + k) * TOGETHER).take(TOGETHER);
+        coming(2).for_each(|&cell| prefetch(&geometry.cells, cell as usize));
+        for &cell in coming(1) {
+            geometry.cells[cell as usize].corners.iter().for_each(|&p| prefetch(&geometry.points, p as usize));
+        }
         for (&cell, read) in some.iter().zip(&mut read) {
-            let corners = scene.geometry.cells[cell as usize].corners;
+            let Cell { corners, neighbours } = geometry.cells[cell as usize];
+            records.around.push(neighbours);
             for (to, from) in read.corners.iter_mut().zip(corners) {
-                *to = scene.geometry.points[from as usize];
+                *to = geometry.points[from as usize];
             }
             read.values = scene.corner_values(cell, corners);
         }
@@ -318,7 +277,7 @@ fn set_up_eight<S: Simd, const N: usize>(
     cells: &[u32],
     read: &mut [Read<N>],
     [left, top]: [u32; 2],
-    records: &mut Vec<Record<N>>,
+    records: &mut Records<N>,
 ) {
     let lens = scene.lens;
     let zero = [0.0; EIGHT];
@@ -359,6 +318,20 @@ fn set_up_eight<S: Simd, const N: usize>(
             (*x, *y) = (*x - place[0] * *z, *y - place[1] * *z);
         }
     }
+    // Corners on the screen, in pixels of the tile.
+    let aside = [place[0] - f64::from(left), place[1] - f64::from(top)];
+    let mut outline = [[single(simd, aside[0]); 4], [single(simd, aside[1]); 4]];
+    for k in 0..3 {
+        let along = if lens.meet {
+            let along = w + e[k][2];
+            along.simd_gt(of(NEAREST)).select(one / along, of(f64::INFINITY))
+        } else {
+            one
+        };
+        for x in 0..2 {
+            outline[x][k + 1] = single(simd, e[k][x].mul_add(along, aside[x]));
+        }
+    }
     let mut a = [cross(e[1], e[2]), cross(e[2], e[0]), cross(e[0], e[1])];
     let det = e[0][0] * a[0][0] + e[0][1] * a[0][1] + e[0][2] * a[0][2];
     let sign = one.copysign(det);
@@ -380,15 +353,14 @@ fn set_up_eight<S: Simd, const N: usize>(
         (planes[1][i + 1], planes[2][i + 1]) = (none - f * a[i][0], none - f * a[i][1]);
     }
     let scale = [terms(e[1], e[2]), terms(e[2], e[0]), terms(e[0], e[1])];
-    let turned = |v: f64x8<S>| v.simd_gt(none).to_bitmask();
-    let fronts = [turned(none - c), turned(a[0][2]), turned(a[1][2]), turned(a[2][2])];
-    let doubtful = |v: f64x8<S>, scale: f64x8<S>| v.abs().simd_le(scale * EDGE_ON).to_bitmask();
-    let doubts = [
-        doubtful(c, m * (scale[0] + scale[1] + scale[2])),
-        doubtful(a[0][2], scale[0]),
-        doubtful(a[1][2], scale[1]),
-        doubtful(a[2][2], scale[2]),
-    ];
+    // A bit for each face: turned to the eye, and edge-on.
+    let turned = |v: f64x8<S>, bit: f64| v.simd_gt(none).select(of(bit), none);
+    let fronts = turned(none - c, 1.0) + turned(a[0][2], 2.0) + (turned(a[1][2], 4.0) + turned(a[2][2], 8.0));
+    let doubtful = |v: f64x8<S>, scale: f64x8<S>, bit: f64| v.abs().simd_le(scale * EDGE_ON).select(of(bit), none);
+    let doubts = doubtful(c, m * (scale[0] + scale[1] + scale[2]), 1.0)
+        + doubtful(a[0][2], scale[0], 2.0)
+        + (doubtful(a[1][2], scale[1], 4.0) + doubtful(a[2][2], scale[2], 8.0));
+    let faces = [fronts, doubts].map(|v| i32x8::truncate_from(single(simd, v)).to_array());
     // The chord through the thickest place is at least D over the greatest area.
     let area = (sum[2].abs()).max(a[0][2].abs()).max(a[1][2].abs().max(a[2][2].abs()));
     let extent = e[0][2].max(e[1][2]).max(e[2][2].max(none)) - e[0][2].min(e[1][2]).min(e[2][2].min(none));
@@ -408,7 +380,7 @@ fn set_up_eight<S: Simd, const N: usize>(
     let (column, row) = (right.round_ties_even(), down.round_ties_even());
     let corner = [f64::from(left), f64::from(top)];
     let places = singles(simd, [column - corner[0], row - corner[1], right - column, down - row]);
-    let keys = singles(simd, [key, ratio, one / ratio, kappa]);
+    let keys = singles(simd, [key, ratio, one / kappa, kappa]);
     let planes = [singles(simd, planes[0]), singles(simd, planes[1]), singles(simd, planes[2])];
     let mut fields = [[[0.0; 4]; EIGHT]; N];
     let mut spans = [[[0.0; EIGHT]; 2]; N];
@@ -438,18 +410,17 @@ fn set_up_eight<S: Simd, const N: usize>(
     }
     let finite = finite.simd_eq(f32x8::splat(simd, 0.0)).to_bitmask();
     let extents = extent.to_array();
-    let end = lens.size.map(|n| n - 1);
+    let mut pixels = [[0; 4]; EIGHT];
+    let [left, top] = [left as u16, top as u16];
+    for (&cell, pixels) in cells.iter().zip(&mut pixels) {
+        let b = scene.boxes[cell as usize];
+        let (first, last) =
+            (|v: u16, from: u16| v.saturating_sub(from) as u8, |v: u16, from: u16| (v - from).min(MOST) as u8);
+        *pixels = [first(b[0], left), last(b[1], left), first(b[2], top), last(b[3], top)];
+    }
+    let own_blocks = add_blocks(simd, outline[0], outline[1], &pixels[..cells.len()], &mut records.blocks);
     for (l, &cell) in cells.iter().enumerate() {
-        let b = scene.boxes[cell as usize].map(u32::from);
-        let inside = |v: u32, from: u32, end: u32| (v.clamp(from, (from + TILE - 1).min(end)) - from) as u8;
-        let pixels = [
-            inside(b[0], left, end[0]),
-            inside(b[1], left, end[0]),
-            inside(b[2], top, end[1]),
-            inside(b[3], top, end[1]),
-        ];
-        let mask = |m: &[u64; 4]| (0..4).fold(0_usize, |all, k| all | ((m[k] >> l & 1) as usize) << k);
-        let (front, doubt) = (mask(&fronts), mask(&doubts));
+        let [front, doubt] = faces.map(|bits| bits[l] as usize & 15);
         let mut away = !(front | doubt) & 15;
         if first[l] != 0 {
             // Faces 0 and `first` were exchanged.
@@ -467,21 +438,24 @@ fn set_up_eight<S: Simd, const N: usize>(
         let order = u8x16::load_array(simd, FRONTS_FIRST[front]);
         let sorted = |p: [f32; 4]| f32x4::load_array(simd, p).swizzle_dyn_within_blocks(order).to_array();
         let [x, y, beside, below] = places[l];
-        let [key, ratio, inverse, kappa] = keys[l];
-        records.push(Record {
+        let [key, ratio, end, kappa] = keys[l];
+        records.all.push(Record {
             plane: [sorted(planes[0][l]), sorted(planes[1][l]), sorted(planes[2][l])],
             at: [x, y],
             rest: [beside, below],
             kappa,
-            key: [key, ratio, inverse],
+            end,
+            key: [key, ratio],
             field: fields.map(|f| f[l]),
             span,
-            pixels,
+            pixels: pixels[l],
             fronts: front.count_ones() as u8,
             away: away as u8,
             look,
             dark: scene.dark(&span, lines, extents[l]),
             lines,
+            first_block: own_blocks[l].0,
+            blocks: own_blocks[l].1,
             cell,
         });
     }
