@@ -363,10 +363,18 @@ fn a_mesh_that_changes_with_each_frame_is_drawn_by_depth() {
     let Some(mut renderer) = renderer() else { return };
     let (scene, view) = holes();
     let order = |renderer: &Renderer| renderer.stats().projection.unwrap().order;
-    for by in [Order::Mpvo, Order::Mpvo, Order::Depth, Order::Depth] {
+    let log = halite::host::Log::default();
+    for (by, said) in [(Order::Mpvo, 0), (Order::Mpvo, 0), (Order::Depth, 1), (Order::Depth, 0)] {
         set(&mut renderer, &scene);
-        image(&mut renderer, Switches::default(), &view);
+        log.collect(|| image(&mut renderer, Switches::default(), &view));
         assert_eq!(order(&renderer), by);
+        // Once, while it is so.
+        let lines = log.take();
+        assert_eq!(
+            lines.iter().filter(|l| l.starts_with("WARN") && l.contains("order of their depths")).count(),
+            said,
+            "{lines:?}"
+        );
     }
     let still = image(&mut renderer, Switches::default(), &view);
     assert_eq!(order(&renderer), Order::Mpvo);

@@ -96,12 +96,16 @@ def test_bad_settings_are_one_error_and_can_be_mended():
         for name, value in good.items():
             getattr(m, "Set" + name)(value)
         check(pixels(w), expected, what=str(settings))
-    # Tables have no room for two components.
+    # A pair of the same values is that field, and is read from weights of its colours.
     g = lattice(1, field=lambda p: np.stack([SLANT(p), SLANT(p)], -1))
     m.SetInputData(g)
     v.GetProperty().IndependentComponentsOff()
-    m.SetIntegral("polynomial")
-    assert pixels(w).max() == 0 and len(said) == 1 and "one component" in said[0], said
+    for form in ("polynomial", "volume", "cylindrical"):
+        m.SetIntegral(form)
+        check(pixels(w), expected, what=form)
+    # Grids, and tables of parabolas, know one component.
+    m.SetIntegral("second-order-polynomial")
+    assert pixels(w).max() == 0 and len(said) == 1 and "grids" in said[0], said
 
 
 def test_setters_tell_changes_only():
