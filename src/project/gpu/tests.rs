@@ -265,8 +265,8 @@ fn the_order_of_a_mesh_outlives_edits() {
     assert!(second != first && sorts == 1);
     let moved: Vec<DVec3> = mesh.points().iter().map(|p| *p * 0.9).collect();
     renderer.set_points(&moved).unwrap();
-    let (third, sorts) = place(&mut renderer, &View::new(camera, [32, 32]).unwrap());
-    assert!(third != second && sorts == 1);
+    assert!(renderer.backend().project().unwrap().sequence.is_none());
+    assert_eq!(place(&mut renderer, &View::new(camera, [32, 32]).unwrap()).1, 1);
 }
 
 #[test]
