@@ -229,7 +229,7 @@ fn forms_of_components() -> [(Choice, f64, f64); 4] {
     [
         (Choice::of(Form::Volume), 4e-3, 4e-3),
         (Choice::of(Form::Polynomial), 1e-3, 2e-3),
-        (volume(Kind::Uniform, [256, 256, 64]), 2e-3, 4e-3),
+        (volume(Kind::Uniform, [128, 128, 32]), 6e-3, 2e-2),
         (cylindrical(Planes::Two), 2e-2, 5e-2),
     ]
 }
