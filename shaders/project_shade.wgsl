@@ -18,6 +18,11 @@ fn colored(front: Value, back: Value, length: f32, words: Words) -> vec4f {
     if COLORING == EXACT {
         return integrated(front, back, length, words);
     }
+    if PAIR || RGBA {
+        light = vec4f(0.0, 0.0, 0.0, 1.0);
+        add_tabulated(front, back, length);
+        return vec4f(light.xyz, 1.0 - light.w);
+    }
     return tabulated(last_of(front), last_of(back), length);
 }
 

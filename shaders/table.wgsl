@@ -151,8 +151,91 @@ fn looked_up(front: f32, back: f32, length: f32) -> vec4f {
     return in_volume(ends, length);
 }
 
+/// What tables of colours with components of their own tell, and what a part of constant extinction does, in the same way: the weight
+/// of the colour behind, that of the colour in front, and the opacity.
+struct Weights {
+    behind: f32,
+    before: f32,
+    opacity: f32,
+}
+
+fn table_weights(front: f32, back: f32, length: f32) -> Weights {
+    let texel = looked_up(front, back, length);
+    return Weights(texel.x, texel.y, texel.w);
+}
+
+fn outer_weights(s: f32, length: f32) -> Weights {
+    let extinction = knots[select(function.opacity, function.color - 1u, s > 0.0)].value.x;
+    let p = piece(extinction * length, extinction * length);
+    let unit = select(1.0, length, DIRECT);
+    return Weights(p.z * unit, p.y * unit, p.x);
+}
+
+fn add_weighted(weights: Weights, first: vec3f, last: vec3f) {
+    let emitted = first * weights.before + last * weights.behind;
+    light = vec4f(light.xyz + light.w * emitted, light.w * (1.0 - weights.opacity));
+}
+
+/// Adds a segment whose colours are linear from `first` to `last`: see src/integral/lookup/components.rs.
+fn add_linear(front: f32, back: f32, first: vec3f, last: vec3f, length: f32) {
+    if max(abs(front), abs(back)) <= WITHIN {
+        add_weighted(table_weights(front, back, length), first, last);
+        return;
+    }
+    let inner = clamp(vec2f(front, back), vec2f(-1.0), vec2f(1.0));
+    if inner.x == inner.y {
+        add_weighted(outer_weights(front, length), first, last);
+        return;
+    }
+    let over = 1.0 / (back - front);
+    let parts = vec3f(inner.x - front, inner.y - inner.x, back - inner.y) * (over * length);
+    let enter = first + (last - first) * ((inner.x - front) * over);
+    let leave = first + (last - first) * ((inner.y - front) * over);
+    add_weighted(outer_weights(front, parts.x), first, enter);
+    add_weighted(table_weights(inner.x, inner.y, parts.y), enter, leave);
+    add_weighted(outer_weights(back, parts.z), leave, last);
+}
+
 /// Adds a segment to the light, as `add_segment` does.
-fn add_tabulated(front: f32, back: f32, length: f32) {
-    let segment = tabulated(front, back, length);
+fn add_tabulated(front: Value, back: Value, length: f32) {
+    if RGBA {
+        add_linear(last_of(front), last_of(back), color_of(front) * function.scale, color_of(back) * function.scale, length);
+        return;
+    }
+    if PAIR {
+        add_tabulated_pair(front, back, length);
+        return;
+    }
+    let segment = tabulated(last_of(front), last_of(back), length);
     light = vec4f(light.xyz + light.w * segment.xyz, light.w * (1.0 - segment.w));
+}
+
+/// The same where colours are on a function of their own: a part for each of its lines.
+fn add_tabulated_pair(front: Value, back: Value, length: f32) {
+    var color = track(function.color, function.end, BUCKETS, first_of(front), first_of(back));
+    let stop = first_of(back);
+    let rise = last_of(back) - last_of(front);
+    var value = last_of(front);
+    loop {
+        let ahead = ahead_of(color);
+        let is_last = select(color.rise == 0.0 || ahead <= stop, ahead >= stop, color.rise > 0.0);
+        let to = select(ahead, stop, is_last);
+        var share = 1.0;
+        var so_far = 1.0;
+        if color.rise != 0.0 {
+            share = (to - color.at) / color.rise;
+            so_far = (to - color.front) / color.rise;
+        }
+        if share > 0.0 {
+            let end = select(last_of(front) + rise * so_far, last_of(back), is_last);
+            add_linear(value, end, line_of(color, color.at).yzw, line_of(color, to).yzw, share * length);
+            value = end;
+        }
+        work++;
+        if is_last || light.w <= 0.0 || work > most_work() || !has_next(color) {
+            return;
+        }
+        color.at = to;
+        color.i = next_of(color);
+    }
 }

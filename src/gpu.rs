@@ -159,6 +159,8 @@ pub(crate) struct Gpu {
     pub(crate) adapter: Description,
     /// Bytes that may be allocated; our own limit, as some drivers promise more than there is.
     pub(crate) budget: u64,
+    /// Bytes that one binding of an array may have, at most; tests lower it.
+    pub(crate) binding: u64,
     allocated: Arc<AtomicU64>,
     uploaded: AtomicU64,
     fault: Arc<Mutex<Option<Fault>>>,
@@ -242,7 +244,9 @@ impl Gpu {
         device.set_device_lost_callback(move |reason, message| lost(Fault::Lost(format!("{reason:?}: {message}"))));
         // Half of the main memory for a device that is the CPU; real ones tell when they have no more.
         let budget = if description.kind == "CPU" { main_memory() / 2 } else { u64::MAX };
+        let limits = device.limits();
         Ok(Gpu {
+            binding: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size),
             device,
             queue,
             adapter: description,

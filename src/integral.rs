@@ -242,6 +242,21 @@ impl<R: Real> Exact<R> {
         Exact { kind, opacity, color, scale: R::of(emission), direct }
     }
 
+    /// What a table is of: this function, if it is of one component; else one whose "colours", those of an RGBA field, are the
+    /// weights of the colours at the two ends of a segment, along which colours are linear. `None` of one component.
+    ///
+    /// With colours c_f and c_b, a segment emits C = c_f W_f + c_b W_b, W_b = ∫ u dA and W_f = ∫ (1 − u) dA over the opacity A that
+    /// is gathered at the share u of its length (direct: over what is seen of the length).
+    pub fn weights(&self) -> Option<Self> {
+        (self.kind != Kind::Scalar).then(|| Exact {
+            kind: Kind::Rgba,
+            opacity: self.opacity.clone(),
+            color: None,
+            scale: R::of(1.0),
+            direct: self.direct,
+        })
+    }
+
     /// Calls `piece` for each piece of a segment whose field is `front` where the ray enters and `back` where it
     /// leaves, in order: with extinction and colour at its two ends, and its share of the segment's length. Values that
     /// are not finite make the segment invisible. `N` is the number of the field's components.

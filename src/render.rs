@@ -17,7 +17,7 @@ mod tables;
 use crate::cast::Reconstruction;
 pub use crate::engine::Engine;
 use crate::error::{Error, Result};
-use crate::field::Field;
+use crate::field::{Field, Kind};
 use crate::geometry::Geometry;
 use crate::gpu::Part;
 use crate::gpu::table::builds;
@@ -405,13 +405,14 @@ impl Renderer {
                 let mut choice = self.integral;
                 self.stats.knots_per_cell = 0.0;
                 if choice.form == Form::Auto {
-                    choice.form = Form::Exact;
-                    if let AnyValues::Scalar(v) = &field.values {
-                        self.stats.knots_per_cell = tables::knots_in_cells(&mesh.geometry, v, exact);
-                        choice = self.integral.resolved(self.stats.knots_per_cell, exact.opacity.len());
-                        if choice.check_function(exact).is_err() {
-                            choice.form = Form::Exact;
-                        }
+                    self.stats.knots_per_cell = match &field.values {
+                        AnyValues::Scalar(v) => tables::knots_in_cells(&mesh.geometry, v, exact),
+                        AnyValues::Pair(v) => tables::knots_in_cells(&mesh.geometry, v, exact),
+                        AnyValues::Rgba(v) => tables::knots_in_cells(&mesh.geometry, v, exact),
+                    };
+                    choice = self.integral.resolved(self.stats.knots_per_cell, exact.opacity.len());
+                    if choice.check_function(exact).is_err() {
+                        choice.form = Form::Exact;
                     }
                 }
                 if choice.form.is_of_second_order() {
@@ -424,6 +425,8 @@ impl Renderer {
                     let (pool, geometry) = (&self.pool, &mesh.geometry);
                     let longest = *mesh.longest.get_or_insert_with(|| pool.install(|| geometry.longest_edge()));
                     let exact = Exact::new(transfer, kind, normal, geometry.scale);
+                    // Devices build colours, and no weights of such.
+                    let on_device = on_device && kind == Kind::Scalar;
                     Arc::new(Key { exact, choice, longest, on_device })
                 });
                 self.key.insert(key)

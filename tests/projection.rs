@@ -293,7 +293,6 @@ fn floats_and_dithering_cure_8_bits() {
         variants.map(|s| rmse(&blurred(&image(&mut renderer, s, &view)), &blurred(&expected)));
     eprintln!("8 bits {plain:.1e}, dithered {dithered:.1e}, 16-bit floats {half:.1e}, floats {float:.1e}");
     assert!(plain > 3.0 * dithered && plain > 10.0 * half && half > 5.0 * float && float < 1e-5);
-
     // Cells that only add up dither their colours.
     let additive = |s| Switches { compositing: Compositing::Additive, ..s };
     let [sum, plain, dithered] = [Switches::default(), eight, Switches { dither: true, ..eight }]
@@ -363,10 +362,12 @@ fn a_mesh_that_changes_with_each_frame_is_drawn_by_depth() {
     let Some(mut renderer) = renderer() else { return };
     let (scene, view) = holes();
     let order = |renderer: &Renderer| renderer.stats().projection.unwrap().order;
-    for by in [Order::Mpvo, Order::Mpvo, Order::Depth, Order::Depth] {
+    let log = halite::host::Log::default();
+    for wanted in [(Order::Mpvo, 0), (Order::Mpvo, 0), (Order::Depth, 1), (Order::Depth, 0)] {
         set(&mut renderer, &scene);
-        image(&mut renderer, Switches::default(), &view);
-        assert_eq!(order(&renderer), by);
+        log.collect(|| image(&mut renderer, Switches::default(), &view));
+        let said = log.take().iter().filter(|line| line.contains("in the order of their depths")).count();
+        assert_eq!((order(&renderer), said), wanted);
     }
     let still = image(&mut renderer, Switches::default(), &view);
     assert_eq!(order(&renderer), Order::Mpvo);
@@ -413,7 +414,6 @@ fn what_it_cannot_draw_it_says() {
     let table = renderer.render(&view, &|_| ()).unwrap_err();
     assert!(table.to_string().contains("table"), "{table}");
     renderer.set_integral(Choice::default());
-    // It draws on after all of these.
     assert!(image(&mut renderer, Switches::default(), &view).pixels.iter().any(|p| p[3] > 0.1));
 }
 

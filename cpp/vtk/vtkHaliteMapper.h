@@ -83,9 +83,9 @@ public:
   /**
    * The form of the ray integral: "exact" (the default); a pre-integrated table, "volume", "polynomial" or "cylindrical" (and for a
    * Reconstruction by parabolas "second-order" or "second-order-polynomial"); or
-   * "auto": exact, or a table where a function has so many points that it is faster. Tables are for arrays of which one component
-   * or the magnitude is drawn. After an edit of the volume's property frames are exact until the table is built anew, which
-   * happens meanwhile; after a change of this or of what follows, the next frame waits for it.
+   * "auto": exact, or a table where a function has so many points that it is faster. On images and rectilinear grids tables are for
+   * arrays of which one component or the magnitude is drawn. After an edit of the volume's property frames are exact until the
+   * table is built anew, which happens meanwhile; after a change of this or of what follows, the next frame waits for it.
    */
   vtkSetStringMacro(Integral);
   vtkGetStringMacro(Integral);

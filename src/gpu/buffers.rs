@@ -78,9 +78,7 @@ impl Chunks {
         source: &[S],
         convert: impl Fn(&S) -> T,
     ) -> Result<Self> {
-        let limits = gpu.device.limits();
-        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        let shift = (most / size_of::<T>() as u64).max(1).ilog2().min(31);
+        let shift = (gpu.binding / size_of::<T>() as u64).max(1).ilog2().min(31);
         let mut buffers = Vec::new();
         let mut slice = vec![T::zeroed(); (SLICE / size_of::<T>()).min(source.len())];
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;

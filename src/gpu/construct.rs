@@ -239,10 +239,8 @@ impl Builder {
         plan: &Plan,
         pitch: u32,
     ) -> Result<Option<Texels>> {
-        let limits = gpu.device.limits();
-        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let bytes = plan.rows.map(|rows| 16 * u64::from(pitch) * u64::from(rows));
-        if bytes.iter().any(|&b| b > most) {
+        if bytes.iter().any(|&b| b > gpu.binding) {
             return Ok(None);
         }
         let Nodes { parts, begin, nodes } = Nodes::new(exact, plan.size);

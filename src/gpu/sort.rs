@@ -51,9 +51,7 @@ impl Sorter {
 
     /// Whether `items` keys are few enough for the device's bindings.
     pub(crate) fn fits(gpu: &Gpu, items: usize) -> bool {
-        let limits = gpu.device.limits();
-        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        4 * items as u64 <= most
+        4 * items as u64 <= gpu.binding
     }
 
     /// The numbers of the items of `keys`, which is as long as `items` and is overwritten, by ascending key; equal ones

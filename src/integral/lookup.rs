@@ -1,5 +1,6 @@
 //! Tables as engines read them: in 32 bits, with texels rounded to what a device stores.
 
+mod components;
 mod texels;
 
 use super::choice::{Alpha, Choice, Form, Planes, Texels};
@@ -9,6 +10,7 @@ use super::table::{
 use super::{Exact, Light, opacity_of_depth, table};
 use crate::error::{Error, Result};
 use crate::field;
+use std::borrow::Cow;
 pub(crate) use texels::Range;
 use texels::{between, bilinear, from_zero, greatest, trilinear, with_density, within};
 
@@ -63,8 +65,9 @@ impl Lookup {
     /// pool.
     ///
     /// # Errors
-    /// Those of [`Choice::check`]; [`Error::Render`] for fields of several components, of which tables have no room.
+    /// Those of [`check`].
     pub fn new(exact: &Exact<f64>, choice: &Choice, longest: f64) -> Result<Self> {
+        let exact = &*tabulated(exact);
         let [front, back, depth] = sized(exact, choice, longest)?;
         let stored = match choice.form {
             Form::Volume => Table::closed(exact, choice.lengths, [front, back, depth], longest).map(Stored::Volume),
@@ -89,6 +92,7 @@ impl Lookup {
     /// # Errors
     /// As [`Self::new`].
     pub(crate) fn renewed(old: Self, exact: &Exact<f64>, choice: &Choice, longest: f64) -> Result<Self> {
+        let exact = &*tabulated(exact);
         let fits = old.choice == *choice && old.longest() == longest && old.source.is_none();
         if !fits || old.size() != sized(exact, choice, longest)? {
             return Self::new(exact, choice, longest);
@@ -120,6 +124,7 @@ impl Lookup {
     /// # Errors
     /// As [`Self::new`].
     pub(crate) fn outline(exact: &Exact<f64>, choice: &Choice, longest: f64) -> Result<Self> {
+        let exact = &*tabulated(exact);
         let [front, back, depth] = sized(exact, choice, longest)?;
         let (direct, kind, degree) = (exact.direct, choice.lengths, choice.degree);
         let stored = match choice.form {
@@ -400,8 +405,8 @@ impl Lookup {
         [r * seen, g * seen, b * seen, alpha]
     }
 
-    /// Adds a segment of `length` to `light`. Values that are not finite make it invisible. Beyond ±1 the function is
-    /// constant: that part of a segment is integrated exactly.
+    /// Adds a segment of `length`, of a field of one component, to `light`. Values that are not finite make it invisible. Beyond ±1 the
+    /// function is constant: that part of a segment is integrated exactly.
     #[inline]
     pub fn add(&self, exact: &Exact<f32>, front: f32, back: f32, length: f32, light: &mut Light<f32>) {
         if !(front.is_finite() && back.is_finite()) {
@@ -425,6 +430,11 @@ impl Lookup {
             exact.add(&[far], &[back], part(far, back), light);
         }
     }
+}
+
+/// What a table is of: the function, or the weights of the colours at a segment's ends.
+fn tabulated(exact: &Exact<f64>) -> Cow<'_, Exact<f64>> {
+    exact.weights().map_or(Cow::Borrowed(exact), Cow::Owned)
 }
 
 /// Texels along the axes of the table that `choice` says: where nobody said how many, by the bounds of its error.
@@ -453,10 +463,12 @@ fn sized(exact: &Exact<f64>, choice: &Choice, longest: f64) -> Result<[u32; 3]> 
 /// Whether `choice` can be drawn with, of that size and for fields of this kind.
 ///
 /// # Errors
-/// Those of [`Lookup::new`].
+/// Those of [`Choice::check`]; [`Error::Render`] for a table of parabolas of fields of several components.
 pub fn check(choice: &Choice, size: [u32; 3], kind: field::Kind) -> Result<()> {
-    if kind != field::Kind::Scalar && choice.form != Form::Exact {
-        return Err(Error::Render("tables are for fields of one component; use the exact integral".into()));
+    if kind != field::Kind::Scalar && choice.form.is_of_second_order() {
+        return Err(Error::Render(
+            "tables of parabolas are for fields of one component; use the exact integral".into(),
+        ));
     }
     choice.check(size)
 }

@@ -3,6 +3,10 @@
 //! Each form is judged by the exact integral, and read here as a device's linear filter reads it: [`Table`] has all
 //! three parameters, [`Polynomial`] the values only, and [`Cylindrical`] planes of two parameters that hold a projected
 //! cell each. [`SecondOrder`], [`SecondOrderLengths`] and [`SecondOrderPolynomial`] are for slabs along which the value is a parabola.
+//!
+//! Where a component of its own is the colour, a table cannot know it: it then holds the *weights* of the colours at a segment's two
+//! ends, between which these are linear ([`Exact::weights`]): in place of red that of the colour behind, in place of green that of the
+//! colour in front. They are integrals of the opacity's component alone, as opacity is.
 
 mod bound;
 mod closed;
@@ -35,9 +39,23 @@ pub(crate) use volume::OPAQUE_DEPTH;
 use super::{Exact, Light};
 use crate::field;
 
-/// Whether a function can be tabulated: tables have no room for fields of several components.
+/// Whether a function is of one component, so that a table holds its colours.
 fn is_scalar(exact: &Exact<f64>) -> bool {
     exact.kind == field::Kind::Scalar
+}
+
+/// Whether a function can be tabulated: that of one component, or the weights of the colours of several.
+fn is_tabulated(exact: &Exact<f64>) -> bool {
+    exact.kind != field::Kind::Pair
+}
+
+/// Calls `piece` with each piece of a segment between two values of the component that opacity is of: see
+/// [`Exact::for_each_piece`]. Of weights, the colours are how far behind and before the ends of the segment it is.
+fn for_each_piece(exact: &Exact<f64>, front: f64, back: f64, piece: impl FnMut([f64; 4], [f64; 4], f64)) {
+    match exact.kind {
+        field::Kind::Scalar => exact.for_each_piece(&[front], &[back], piece),
+        _ => exact.for_each_piece(&[0.0, 1.0, 0.0, front], &[1.0, 0.0, 0.0, back], piece),
+    }
 }
 
 /// The normalised scalar of texel `i` of `n`.
@@ -75,7 +93,10 @@ fn reconstructed(color: [f64; 3], density: f64, l: f64, direct: bool) -> [f64; 4
 
 fn light(exact: &Exact<f64>, front: f64, back: f64, l: f64) -> Light<f64> {
     let mut light = Light::none();
-    exact.add(&[front], &[back], l, &mut light);
+    match exact.kind {
+        field::Kind::Scalar => exact.add(&[front], &[back], l, &mut light),
+        _ => exact.add(&[0.0, 1.0, 0.0, front], &[1.0, 0.0, 0.0, back], l, &mut light),
+    }
     light
 }
 

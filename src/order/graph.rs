@@ -13,6 +13,9 @@ use rayon::prelude::*;
 /// Buckets of cells by depth.
 const BUCKETS: usize = 1 << 12;
 
+/// Cells whose neighbours are released at a time.
+const AT_ONCE: usize = 64;
+
 /// The bits of a node: its [`Facing::behind`], whether gaps begin at the cell, its bucket, and from the last one on how many cells
 /// that come before it have not had their turn.
 const GAPS: u64 = 1 << 4;
@@ -158,24 +161,55 @@ impl<'a> Graph<'a> {
                 queue.push(cell, node);
             }
         }
-        let mut batch = vec![];
+        let (mut batch, mut after, mut left) = (vec![], [0; 4 * AT_ONCE], [0; 4 * AT_ONCE]);
         while queue.pop(&mut batch) {
             sequence.extend_from_slice(&batch);
-            for cell in batch.drain(..) {
-                let node = self.nodes[cell as usize];
-                let neighbours = &self.cells[cell as usize].neighbours;
-                let mut faces = node & 15;
-                while faces != 0 {
-                    let k = faces.trailing_zeros() as usize;
-                    faces &= faces - 1;
-                    release(&mut self.nodes, &mut queue, neighbours[k]);
+            for cells in batch.chunks(AT_ONCE) {
+                let (count, has_gaps) = self.after_all(cells, &mut after);
+                for (left, &cell) in left.iter_mut().zip(&after[..count]) {
+                    let node = &mut self.nodes[cell as usize];
+                    *node -= ONE;
+                    *left = *node;
                 }
-                if node & GAPS != 0 {
-                    for gap in self.gaps_of(cell) {
-                        if !self.gaps[gap].is_cut {
-                            release(&mut self.nodes, &mut queue, self.gaps[gap].to);
-                        }
+                for (&node, &cell) in left[..count].iter().zip(&after) {
+                    if node < ONE {
+                        queue.push(cell, node);
                     }
+                }
+                if has_gaps {
+                    self.release_gaps(cells, &mut queue);
+                }
+            }
+            batch.clear();
+        }
+    }
+
+    /// Gathers the neighbours behind each of some cells, at most [`AT_ONCE`], and how many these are; and whether any gap begins at
+    /// the cells. Nothing is decided by what memory has to find: it is asked for all of it at a time.
+    #[inline(always)]
+    fn after_all(&self, cells: &[u32], after: &mut [u32; 4 * AT_ONCE]) -> (usize, bool) {
+        let mut known = [(0, [0; 4]); AT_ONCE];
+        for (known, &cell) in known.iter_mut().zip(cells) {
+            *known = (self.nodes[cell as usize], self.cells[cell as usize].neighbours);
+        }
+        let (mut count, mut all) = (0, 0);
+        for (node, neighbours) in &known[..cells.len()] {
+            all |= node;
+            for (k, &neighbour) in neighbours.iter().enumerate() {
+                // What is not behind is written over.
+                after[count] = neighbour;
+                count += (node >> k & 1) as usize;
+            }
+        }
+        (count, all & GAPS != 0)
+    }
+
+    /// Releases the cells beyond the gaps that begin at some cells.
+    fn release_gaps(&mut self, cells: &[u32], queue: &mut Queue) {
+        for &cell in cells {
+            for gap in self.gaps_of(cell) {
+                if !self.gaps[gap].is_cut {
+                    release(&mut self.nodes, queue, self.gaps[gap].to);
                 }
             }
         }

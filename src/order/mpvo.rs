@@ -23,6 +23,8 @@ const MOST_PIXELS: u32 = 1 << 15;
 pub enum Rule {
     /// Kahn's algorithm over shared faces and gaps, nearest first, cut where the fewest pixels see it.
     Mpvo,
+    /// The same over shared faces alone: right for convex meshes, to which it is the same.
+    Faces,
     /// Depth first over shared faces (Williams 1992): right for convex meshes.
     Convex,
     /// The same from the farthest cell without one before it on, by the distances of their centres (Williams' MPVONC, 1992).
@@ -58,6 +60,11 @@ pub struct Mpvo {
 }
 
 impl Mpvo {
+    /// Whether the last mesh was found to be convex, by an order that asked.
+    pub fn is_convex(&self) -> bool {
+        self.convex == Some(true)
+    }
+
     /// The order of a mesh whose cells know their neighbours, on the current rayon pool. The result does not depend on its number of
     /// threads.
     pub fn sequence(&mut self, geometry: &Geometry, view: &View, rule: Rule) -> Sequence {
@@ -72,7 +79,7 @@ impl Mpvo {
         let rays = lens.as_ref().filter(|_| asks_rays).map(|lens| Rays::new(geometry, lens));
         let (gaps, overlapping) = rays.as_ref().map(Rays::gaps).unwrap_or_default();
         let mut graph = Graph::new(geometry, source, gaps);
-        if rule != Rule::Mpvo {
+        if !matches!(rule, Rule::Mpvo | Rule::Faces) {
             let cells = published::depth_first(&graph, geometry, source, rule);
             return Sequence { cells, overlapping: overlapping.len() as u64, ..Sequence::default() };
         }

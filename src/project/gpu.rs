@@ -160,6 +160,19 @@ impl Project {
         (self.order_chunk, self.ordered) = (entries, None);
     }
 
+    /// Has each binding of an array hold so many bytes at most from now on.
+    #[cfg(test)]
+    pub(crate) fn bind_at_most(&mut self, bytes: u64) {
+        self.gpu.binding = bytes;
+        self.forget(Part::Mesh);
+    }
+
+    /// How many bindings cells, points and values have.
+    #[cfg(test)]
+    pub(crate) fn bindings(&self) -> Vec<usize> {
+        self.chunks().map_or(vec![], |all| all.iter().map(|c| c.buffers.len()).collect())
+    }
+
     /// Takes `part` for changed.
     pub(crate) fn forget(&mut self, part: Part) {
         self.ordered = None;

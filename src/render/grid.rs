@@ -69,6 +69,11 @@ impl OnGrid {
         }
         self.chooser.choose(transfer, true);
         let own = Exact::new(transfer, self.kind(), self.chooser.normal(), volume.scale);
+        if self.kind() != Kind::Scalar {
+            return Err(Error::Render(
+                "tables of grids are for fields of one component; use the exact integral".into(),
+            ));
+        }
         lookup::check(choice, choice.size(own.opacity.len()), self.kind())?;
         choice.check_function(&Exact::new(transfer, self.kind(), self.chooser.normal(), volume.scale))?;
         let slab = match how.sampling {

@@ -159,17 +159,17 @@ impl Renderer {
     }
 }
 
-/// How many knots of the function the values of the mean cell have between them; of a sample, where there are many
-/// cells.
-pub(super) fn knots_in_cells(geometry: &Geometry, values: &Values<1>, exact: &Exact<f32>) -> f64 {
+/// How many knots of the function the values of the mean cell have between them, those of opacity where that has a component of its
+/// own; of a sample, where there are many cells.
+pub(super) fn knots_in_cells<const N: usize>(geometry: &Geometry, values: &Values<N>, exact: &Exact<f32>) -> f64 {
     let knots = exact.opacity.places();
     let step = geometry.cells.len().div_ceil(SAMPLES).max(1);
     let (mut sum, mut count) = (0u64, 0u64);
     for (i, cell) in geometry.cells.iter().enumerate().step_by(step) {
         let corners = match values {
-            Values::Point(v) => cell.corners.map(|p| v[p as usize][0]),
-            Values::Corner(v) => v[i].map(|[s]| s),
-            Values::Cell(v) => [v[i][0]; 4],
+            Values::Point(v) => cell.corners.map(|p| v[p as usize][N - 1]),
+            Values::Corner(v) => v[i].map(|s| s[N - 1]),
+            Values::Cell(v) => [v[i][N - 1]; 4],
         };
         let [low, high] = [corners.into_iter().fold(f32::MAX, f32::min), corners.into_iter().fold(f32::MIN, f32::max)];
         if low <= high {

@@ -34,8 +34,7 @@ const ARRAYS: [(&str, &str); 6] = [
 
 /// How a segment joins the light before it.
 const ADD_EXACT: &str = "fn add(front: Value, back: Value, length: f32) { add_segment(front, back, length); }\n";
-const ADD_TABULATED: &str =
-    "fn add(front: Value, back: Value, length: f32) { add_tabulated(last_of(front), last_of(back), length); }\n";
+const ADD_TABULATED: &str = "fn add(front: Value, back: Value, length: f32) { add_tabulated(front, back, length); }\n";
 
 /// Rays of one dispatch at most: a driver ends work that takes seconds.
 const RAYS: u64 = 1 << 21;
@@ -147,6 +146,19 @@ impl Traverse {
 
     pub(crate) fn gpu(&self) -> &Gpu {
         &self.gpu
+    }
+
+    /// Has each binding of an array hold so many bytes at most from now on.
+    #[cfg(test)]
+    pub(crate) fn bind_at_most(&mut self, bytes: u64) {
+        self.gpu.binding = bytes;
+        self.forget(Part::Mesh);
+    }
+
+    /// How many bindings the arrays of the mesh have, in the order of [`Self::chunks`].
+    #[cfg(test)]
+    pub(crate) fn bindings(&self) -> Vec<usize> {
+        self.chunks().map_or(vec![], |all| all.iter().map(|c| c.buffers.len()).collect())
     }
 
     /// Takes `part` for changed.

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot set up its files has failed")]
 
+mod cycles;
 mod look;
 mod orders;
 mod refusals;
@@ -361,12 +362,17 @@ fn variants_of_the_projection_engine() {
     );
     assert_eq!((code, err.as_str()), (Some(0), ""));
     assert!(out.contains("polynomial, degree 2") && out.contains("plane per cell"), "{out}");
-    let Ran(code, out, err) =
-        place.run("study cube.vtu --orders-of-cells --out o.png --json o.json --frames 1 --size 24x16");
+    place.write("bucky.vtu", &cube());
+    let Ran(code, out, err) = place.run(
+        "study cube.vtu --orders-of-cells --out o.png --json o.json --frames 1 --size 24x16 --also bucky.vtu cube.vtu",
+    );
     assert_eq!((code, err.as_str()), (Some(0), ""));
     assert!(out.contains("MPVONC") && out.contains("XMPVO") && out.contains("0 cycles"), "{out}");
+    // A name that the paper has comes with its figures.
+    assert!(out.contains("1.12 1.20, 1.06 1.12") && out.matches("cube ").count() == 2, "{out}");
     let study: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(place.path("o.json")).unwrap()).unwrap();
+    assert_eq!(study["also"].as_array().unwrap().len(), 2);
     let [.., ours] = study["orders"].as_array().unwrap().as_slice() else { panic!("{study}") };
     assert!(ours["inversions"] == 0 && ours["pairs"].as_u64() > Some(0) && ours["max"].as_f64() < Some(1e-4), "{ours}");
     let forms: serde_json::Value =

@@ -5,7 +5,7 @@ use clap::Args;
 use glam::{DQuat, DVec3};
 use halite::view::{Camera, Projection};
 
-#[derive(Args)]
+#[derive(Args, Clone)]
 #[group(skip)]
 #[command(next_help_heading = "Camera")]
 pub(crate) struct Options {

@@ -10,7 +10,7 @@ use halite::scene::{Scene, integral};
 use std::path::Path;
 
 /// What of the integral's form somebody said.
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub(crate) struct Integral {
     /// How a ray is integrated in a cell: auto, exact, or by a table: volume, polynomial or cylindrical; of a grid's slabs
     /// between samples, second-order (of one length) or second-order-polynomial; with a second variable or light adaptive,

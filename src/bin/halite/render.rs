@@ -46,7 +46,7 @@ pub(crate) struct Options {
 }
 
 /// What to draw, and how.
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub(crate) struct Request {
     /// The mesh, or the scene that describes it (.json); - is standard input, for either
     #[arg(value_name = "MESH.vtu|SCENE.json|-")]
@@ -345,6 +345,11 @@ impl Request {
     /// The scene that the input is, if it is one.
     pub(crate) fn scene(&self) -> Result<Option<Scene>> {
         input::scene(&self.input)
+    }
+
+    /// The same of another mesh.
+    pub(crate) fn of(&self, input: PathBuf) -> Self {
+        Request { input, ..self.clone() }
     }
 
     /// Refuses a picture that there is no memory for, before a mesh is read.

@@ -11,7 +11,7 @@ use halite::transfer::bivariate::Widget;
 use halite::transfer::shading::{Light, Shade};
 use serde_json::{Map, Value, json};
 
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub(crate) struct Second {
     /// Light the volume by a lamp at the eye, with the gradient as normal: its shares and the highlight's power may follow as
     /// --shade=AMBIENT,DIFFUSE,SPECULAR,POWER

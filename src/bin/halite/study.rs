@@ -43,6 +43,9 @@ pub(crate) struct Options {
     /// Compare the orders of cells instead: where each is wrong, and what it takes
     #[arg(long, conflicts_with = "integrals")]
     orders_of_cells: bool,
+    /// Other meshes to compare orders of cells on, as with the first; regular and rectilinear grids among them are passed over
+    #[arg(long, value_name = "FILE", num_args = 1.., requires = "orders_of_cells")]
+    also: Vec<PathBuf>,
     /// Compare the orders of reconstruction of regular and rectilinear grids instead: figures and claims of El Hajjar et al. (2008).
     /// The first volume is that of which tables are timed; names that begin with "synth" are of stand-ins
     #[arg(long, conflicts_with_all = ["integrals", "orders_of_cells"])]

@@ -120,7 +120,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
         let geometry = Geometry::unconnected(&points, &job.tetrahedra);
         let normal = [0, 1, 2, 3].map(|k| job.field.normal(k));
         if job.field.kind() != Kind::Scalar {
-            anyhow::bail!("tables are for fields of one component; choose one with --component");
+            anyhow::bail!("this compares tables of fields of one component; choose one with --component");
         }
         let transfer = &job.scene.transfer;
         let exact = Exact::<f64>::new(transfer, Kind::Scalar, &normal, geometry.scale);

@@ -8,7 +8,7 @@ use serde::de::DeserializeOwned;
 use std::path::Path;
 
 /// What of the projection engine's variant somebody said.
-#[derive(Args)]
+#[derive(Args, Clone)]
 pub(crate) struct Variant {
     /// Where a fragment's values come from: intersected, interpolated, or linear (wrong in perspective)
     #[arg(long, value_name = "FORM", value_parser = named::<Fragments>, help_heading = "Projection engine")]

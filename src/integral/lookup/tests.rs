@@ -193,8 +193,76 @@ fn limits_are_finite() {
         }
     }
     let pair = Exact::<f64>::new(&transfer, field::Kind::Pair, &UNIT, 1.0);
-    let refused = Lookup::new(&pair, &Choice::of(Form::Volume), 1.0).unwrap_err().to_string();
+    let refused = Lookup::new(&pair, &Choice::of(Form::SecondOrder), 1.0).unwrap_err().to_string();
     assert!(refused.contains("one component"), "{refused}");
+}
+
+/// What a segment of a field of several components does by a table, against the exact integral of f64.
+fn worst_of_components<const N: usize>(exact: &Exact<f64>, narrow: &Exact<f32>, choice: &Choice) -> [f64; 2] {
+    let table = Lookup::new(exact, choice, 2.0).unwrap();
+    let (mut colours, mut opacities) = (0.0f64, 0.0f64);
+    let all = segments(4000);
+    for (i, [s, t, l]) in all.iter().copied().enumerate() {
+        let other = all[(7 * i + 3) % all.len()];
+        // Of colours, beyond ±1 too; of opacities in a third.
+        let reach = if i % 3 == 0 { 1.8 } else { 1.0 };
+        let values = |last: f32, from: usize| {
+            std::array::from_fn(|k| if k + 1 == N { last * reach } else { 0.5 + 0.7 * other[(k + from) % 2] })
+        };
+        let (front, back): ([f32; N], [f32; N]) = (values(s, 0), values(t, 1));
+        let (mut got, mut want) = (Light::none(), Light::none());
+        table.add_components(narrow, &front, &back, l, &mut got);
+        exact.add(&front.map(f64::from), &back.map(f64::from), f64::from(l), &mut want);
+        for k in 0..3 {
+            colours = colours.max((f64::from(got.color[k]) - want.color[k]).abs());
+        }
+        opacities = opacities.max((f64::from(got.through) - want.through).abs());
+    }
+    [colours, opacities]
+}
+
+/// Pairs and RGBA by weights: within the bound of their table, and finer tables are nearer.
+#[test]
+fn weights_stand_for_colours_of_their_own() {
+    for emission in [Emission::Chromatic, Emission::Direct { scale: 0.7 }] {
+        let color =
+            vec![(-1.0, [1.0, 0.2, 0.0]), (0.3, [0.0, 0.5, 0.9]), (0.3, [0.9, 0.9, 0.1]), (1.0, [0.4, 0.4, 0.4])];
+        let opacity = vec![(-1.0, 0.2), (0.1, 0.4), (0.4, 0.1), (1.0, 0.5)];
+        let transfer = TransferFunction::new(color, opacity, 1.0).unwrap().with_emission(emission).unwrap();
+        let of =
+            |kind| (Exact::<f64>::new(&transfer, kind, &UNIT, 1.0), Exact::<f32>::new(&transfer, kind, &UNIT, 1.0));
+        let (pair, rgba) = (of(field::Kind::Pair), of(field::Kind::Rgba));
+        let weights = pair.0.weights().unwrap();
+        for (form, small, large) in [
+            (Form::Volume, [33, 33, 10], [129, 129, 14]),
+            (Form::Polynomial, [33, 33, 0], [129, 129, 0]),
+            (Form::Cylindrical, [33, 33, 32], [129, 129, 128]),
+        ] {
+            let errors = [small, large].map(|size| {
+                let choice = Choice { table: Some(size), degree: 3, ..Choice::of(form) };
+                let bound = match Lookup::new(&pair.0, &choice, 2.0).unwrap().stored() {
+                    Stored::Volume(t) => t.bound(&weights),
+                    Stored::Polynomial(t) => t.bound(&weights),
+                    _ => None,
+                };
+                let [pairs, colours] = [
+                    worst_of_components::<2>(&pair.0, &pair.1, &choice),
+                    worst_of_components::<4>(&rgba.0, &rgba.1, &choice),
+                ];
+                eprintln!("{form:?}, {size:?}, {emission:?}: pairs {pairs:?}, RGBA {colours:?}, bound {bound:?}");
+                if let Some(bound) = bound {
+                    // Colours up to 1.2; of pairs up to four look-ups.
+                    assert!(
+                        pairs[0] < 4.0 * bound && colours[0] < 1.2 * bound && pairs[1] < bound && colours[1] < bound
+                    );
+                }
+                [pairs[0], pairs[1], colours[0], colours[1]]
+            });
+            for (small, large) in errors[0].iter().zip(errors[1]) {
+                assert!(large < 1e-2 && large < 0.5 * small + 2e-6, "{form:?}, {emission:?}: {errors:?}");
+            }
+        }
+    }
 }
 
 /// A cell that is 1000 times shorter than another, and dense.

@@ -60,11 +60,16 @@
 //! off, and nothing counts Λ times. *Logarithmic* lengths are linear over an octave: ⅛ of the second derivative by
 //! log₂ l, ln²2 (X² Ĉ″ + X Ĉ′), where X Ĉ′ ≤ 1/e and X² Ĉ″ ≤ 4/e² of what κ varies by.
 
+//!
+//! **Weights** of colours at a segment's ends are tables like these, of a colour that goes from 0 to 1 along the segment, wherever its
+//! values move: so κ is not off and does not shift, c is 1, and all above holds but what follows from κ over the values ("or else").
+//! As texels are weighed linearly, a bound of them is one of every colour from 0 to 1 that is linear along the segment.
+
 mod cell;
 mod function;
 
-use super::is_scalar;
 use super::volume::{Kind, length};
+use super::{is_scalar, is_tabulated};
 use crate::integral::Exact;
 use cell::Cell;
 use std::f64::consts::{E, LN_2};
@@ -103,8 +108,9 @@ fn worst(exact: &Exact<f64>, values: u32, limit: f64, error: impl Fn(&Cell) -> f
     let mut sums = vec![0.0];
     intervals.iter().for_each(|k| sums.push(sums[sums.len() - 1] + k.rise));
     let mut greatest = 0.0f64;
+    let of = |cell: Cell| if is_scalar(exact) { cell } else { cell.of_weights() };
     for i in 0..n {
-        greatest = cell::row(&intervals, &sums, i).fold(greatest, |m, cell| m.max(error(&cell)));
+        greatest = cell::row(&intervals, &sums, i).fold(greatest, |m, cell| m.max(error(&of(cell))));
         if greatest > limit {
             break;
         }
@@ -114,12 +120,14 @@ fn worst(exact: &Exact<f64>, values: u32, limit: f64, error: impl Fn(&Cell) -> f
 
 /// Whether there are bounds for tables of so many values.
 fn is_bounded(exact: &Exact<f64>, values: u32) -> bool {
-    is_scalar(exact) && values >= 3
+    is_tabulated(exact) && values >= 3
 }
 
 /// The greatest of the function's colours.
 pub(super) fn brightest(exact: &Exact<f64>) -> f64 {
-    exact.opacity.value.iter().flat_map(|v| &v[1..]).fold(0.0, |m: f64, &c| m.max(c))
+    // Weights are of a colour of 1.
+    let least = if is_scalar(exact) { 0.0 } else { 1.0 };
+    exact.opacity.value.iter().flat_map(|v| &v[1..]).fold(least, |m: f64, &c| m.max(c))
 }
 
 /// The greatest colour or opacity of a segment: at least 1.
@@ -128,7 +136,7 @@ fn scale(exact: &Exact<f64>, longest: f64) -> f64 {
 }
 
 /// A bound on the error of a table of `kind` and `values`² × `slices` texels for segments of up to `longest` normalised
-/// units, looked up anywhere. `None` for fields of several components, for less than 3 values, and for direct emission
+/// units, looked up anywhere. `None` for pairs, for less than 3 values, and for direct emission
 /// if the table is normalised: the weights of what is seen then add up to more than 1.
 pub fn bound_of_volume(exact: &Exact<f64>, kind: Kind, [values, slices]: [u32; 2], longest: f64) -> Option<f64> {
     if kind == Kind::LogNormalised {
@@ -165,7 +173,7 @@ fn of_normalised(exact: &Exact<f64>, values: u32, slices: u32, longest: f64, lim
 }
 
 /// The smallest powers of 2, of at most 256 values and 128 lengths, whose bounds are half of `error` each for a uniform
-/// volume; the greatest where none is. `None` for fields of several components.
+/// volume; the greatest where none is. `None` for pairs.
 pub fn size(exact: &Exact<f64>, longest: f64, error: f64) -> Option<[u32; 3]> {
     let [mut n, mut slices] = [16, 8];
     while n < 256 && along_values(exact, n, longest, error)? > error / 2.0 {
@@ -174,7 +182,7 @@ pub fn size(exact: &Exact<f64>, longest: f64, error: f64) -> Option<[u32; 3]> {
     while slices < 128 && along_lengths(exact, Kind::Uniform, slices, longest) > error / 2.0 {
         slices *= 2;
     }
-    is_scalar(exact).then_some([n, n, slices])
+    is_tabulated(exact).then_some([n, n, slices])
 }
 
 /// The fewest of the powers of 2 from 64 to `most` values whose bound is `error` for polynomials of `degree`; `None` if

@@ -34,6 +34,26 @@ impl<const L: usize> Lanes<L> {
         }
         sum
     }
+
+    /// Counts the weights of one end of so many intervals more from there: red's end is the first, green's the last.
+    #[inline(always)]
+    fn moved(mut self, [red, green]: [f32; 2]) -> Self {
+        for of in &mut self.0 {
+            of[0] += red * of[2];
+            of[1] += green * of[2];
+        }
+        self
+    }
+
+    /// The weights of a segment of this share of an interval's length: behind is green if the scalar falls.
+    #[inline(always)]
+    fn ended(mut self, share: f32, falls: bool) -> Self {
+        for of in &mut self.0 {
+            let [r, g, _, alpha] = *of;
+            *of = if falls { [g * share, r * share, 0.0, alpha] } else { [r * share, g * share, 0.0, alpha] };
+        }
+        self
+    }
 }
 
 /// The same segments as a rising scalar passes them, and as a falling one does.
@@ -50,6 +70,16 @@ impl<const L: usize> Both<L> {
     #[inline(always)]
     fn then(&self, next: &Self) -> Self {
         Both { rising: self.rising.over(&next.rising), falling: next.falling.over(&self.falling) }
+    }
+
+    /// The same of weights, of runs of so many intervals.
+    #[inline(always)]
+    fn joined<const WEIGHTS: bool>(&self, next: &Self, [own, nexts]: [usize; 2]) -> Self {
+        if !WEIGHTS {
+            return self.then(next);
+        }
+        let both = |both: &Self, by: [f32; 2]| Both { rising: both.rising.moved(by), falling: both.falling.moved(by) };
+        both(self, [0.0, nexts as f32]).then(&both(next, [own as f32, 0.0]))
     }
 }
 
@@ -188,19 +218,35 @@ impl<'a, const L: usize> Runs<'a, L> {
         if std::arch::is_x86_feature_detected!("avx2") {
             #[target_feature(enable = "avx2")]
             fn wide<const L: usize>(runs: &Runs<'_, L>, d: usize, scratch: &mut Scratch<L>, segments: &mut [Both<L>]) {
-                runs.whole(d, scratch, segments);
+                runs.any(d, scratch, segments);
             }
             #[allow(unsafe_code, reason = "vector instructions that the processor was just asked about")]
             // SAFETY: the processor has AVX2.
             return unsafe { wide(self, d, scratch, segments) };
         }
-        self.whole(d, scratch, segments);
+        self.any(d, scratch, segments);
     }
 
     #[inline(always)]
-    fn whole(&self, d: usize, scratch: &mut Scratch<L>, segments: &mut [Both<L>]) {
+    fn any(&self, d: usize, scratch: &mut Scratch<L>, segments: &mut [Both<L>]) {
+        if !self.grid.weights {
+            return self.whole::<false>(d, scratch, segments);
+        }
+        self.whole::<true>(d, scratch, segments);
+        let share = 1.0 / d.max(1) as f32;
+        let count = self.grid.size - d;
+        for both in &mut segments[..count] {
+            *both = Both { rising: both.rising.ended(share, false), falling: both.falling.ended(share, true) };
+        }
+    }
+
+    #[inline(always)]
+    fn whole<const WEIGHTS: bool>(&self, d: usize, scratch: &mut Scratch<L>, segments: &mut [Both<L>]) {
         if d == 0 {
-            let part = |c: &[f32; 4]| Part { front: *c, back: *c, share: 1.0 };
+            let part = |c: &[f32; 4]| match c {
+                [tau, ..] if WEIGHTS => Part { front: [*tau, 0.0, 1.0, 1.0], back: [*tau, 1.0, 0.0, 1.0], share: 1.0 },
+                _ => Part { front: *c, back: *c, share: 1.0 },
+            };
             let parts: Vec<Part> = self.grid.constant.iter().map(part).collect();
             Runs::of(self.grid, &parts, self.lengths).integrate(1.0, |i, both| segments[i] = both);
             return;
@@ -221,17 +267,17 @@ impl<'a, const L: usize> Runs<'a, L> {
             let mut end = intervals[block + d - 1];
             ends[block + d - 1] = end;
             let block_of = block..block + d - 1;
-            for (interval, of) in intervals[block_of.clone()].iter().zip(&mut ends[block_of]).rev() {
-                end = interval.then(&end);
+            for (k, (interval, of)) in (1..d).zip(intervals[block_of.clone()].iter().zip(&mut ends[block_of]).rev()) {
+                end = interval.joined::<WEIGHTS>(&end, [1, k]);
                 *of = end;
             }
             segments[block] = end;
             let rest = block + 1..(block + d).min(runs);
             let next = &intervals[rest.start + d - 1..rest.end + d - 1];
             let mut beginning = Both::NOTHING;
-            for ((segment, end), next) in segments[rest.clone()].iter_mut().zip(&ends[rest]).zip(next) {
-                beginning = beginning.then(next);
-                *segment = end.then(&beginning);
+            for (k, ((segment, end), next)) in (0..).zip(segments[rest.clone()].iter_mut().zip(&ends[rest]).zip(next)) {
+                beginning = beginning.joined::<WEIGHTS>(next, [k, 1]);
+                *segment = end.joined::<WEIGHTS>(&beginning, [d - 1 - k, k + 1]);
             }
         }
     }
@@ -274,20 +320,27 @@ impl<'a, const L: usize> Runs<'a, L> {
 const THIN: f32 = 1e-30;
 
 /// What stands for colour and opacity, between the values `i` and `j`: colour over opacity (direct: over the length
-/// that is seen), and the mean extinction, at most `most`; and the same at the limit where nothing hides anything.
+/// that is seen), and the mean extinction, at most `most`; and the same at the limit where nothing hides anything, for a scalar that rises and one
+/// that falls.
 #[inline(always)]
-pub(super) fn normalise<const L: usize>(grid: &Grid, [i, j]: [usize; 2], both: &mut Both<L>, most: f32) -> [f32; 4] {
+pub(super) fn normalise<const L: usize>(
+    grid: &Grid,
+    [i, j]: [usize; 2],
+    both: &mut Both<L>,
+    most: f32,
+) -> [[f32; 4]; 2] {
     let [r, g, b, density] = grid.limit(i, j);
     let scale = if grid.direct { density } else { 1.0 };
     let limit = [r, g, b, density.min(most)];
-    for lanes in [&mut both.rising, &mut both.falling] {
+    let fallen = if grid.weights { [g, r, b, limit[3]] } else { limit };
+    for (lanes, limit) in [(&mut both.rising, limit), (&mut both.falling, fallen)] {
         for texel in &mut lanes.0 {
             let over = scale / texel[3];
             *texel = if texel[3] > THIN { texel.map(|c| c * over) } else { limit };
             texel[3] = limit[3];
         }
     }
-    limit
+    [limit, fallen]
 }
 
 /// Premultiplied colour and opacity of all segments of one length; the value in front varies fastest.

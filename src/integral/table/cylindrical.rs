@@ -7,7 +7,7 @@
 //! mapping bends at a = ¼, ½ and ¾, so planes are there; those at a = 0 and 1 have no length and so hold nothing: they
 //! are one.
 
-use super::{between, is_scalar, light, published};
+use super::{between, is_scalar, is_tabulated, light, published};
 use crate::integral::{Exact, Light};
 use rayon::prelude::*;
 
@@ -26,9 +26,9 @@ pub struct Cylindrical {
 
 impl Cylindrical {
     /// Integrates `exact` over segments of up to `longest` normalised units, on the current rayon pool. `None` for
-    /// fields of several components, sizes less than 2, and numbers of planes that are not multiples of 4.
+    /// pairs, of which [`Exact::weights`] can be tabulated, sizes less than 2, and numbers of planes that are not multiples of 4.
     pub fn new(exact: &Exact<f64>, planes: u32, size: u32, longest: f64) -> Option<Self> {
-        if !is_scalar(exact) || planes == 0 || !planes.is_multiple_of(4) || size < 2 {
+        if !is_tabulated(exact) || planes == 0 || !planes.is_multiple_of(4) || size < 2 {
             return None;
         }
         let share = |i: u32, n: u32| f64::from(i) / f64::from(n - 1);
@@ -45,19 +45,19 @@ impl Cylindrical {
     /// The same table in a time per texel that does not depend on the function. Along s, both the scalar in front and
     /// the length go on from where the texel before has them: each texel is that one behind a slab, in closed form.
     pub fn closed(exact: &Exact<f64>, planes: u32, size: u32, longest: f64) -> Option<Self> {
-        if !is_scalar(exact) || planes == 0 || !planes.is_multiple_of(4) || size < 2 {
+        if !is_tabulated(exact) || planes == 0 || !planes.is_multiple_of(4) || size < 2 {
             return None;
         }
-        let share = |i: u32| f64::from(i) / f64::from(size - 1);
+        let (weights, share) = (!is_scalar(exact), |i: u32| f64::from(i) / f64::from(size - 1));
         let fill = |(at, row): (usize, &mut [[f32; 4]])| {
             let (a, t) = (f64::from(at as u32 / size) / f64::from(planes), share(at as u32 % size));
             let (mut front, mut length, mut sum) = (2.0 * t - 1.0, 0.0, Light::<f64>::none());
             for (i, texel) in (0..size).zip(row) {
                 let [next, _, l] = place(a, share(i), t);
                 let (next, l) = (2.0 * next - 1.0, l * longest);
-                let mut slab = light(exact, next, front, l - length);
-                slab.add(sum.color, 1.0 - sum.through);
-                (front, length, sum) = (next, l, slab);
+                let slab = light(exact, next, front, l - length);
+                sum = if weights { joined(&slab, &sum, (l - length) / l, exact.direct) } else { behind(slab, &sum) };
+                (front, length) = (next, l);
                 let [r, g, b] = sum.color;
                 *texel = [r, g, b, 1.0 - sum.through].map(|c| c as f32);
             }
@@ -88,6 +88,21 @@ impl Cylindrical {
     pub fn bytes(&self) -> u64 {
         size_of_val(&*self.texels) as u64
     }
+}
+
+/// `slab` and what is behind it.
+fn behind(mut slab: Light<f64>, sum: &Light<f64>) -> Light<f64> {
+    slab.add(sum.color, 1.0 - sum.through);
+    slab
+}
+
+/// The weights of the colours at the ends of both together, the slab being the `share` of the length that is in front.
+fn joined(slab: &Light<f64>, sum: &Light<f64>, share: f64, direct: bool) -> Light<f64> {
+    let share = if share.is_finite() { share } else { 0.0 };
+    let whole = |of: &Light<f64>| if direct { of.color[0] + of.color[1] } else { 1.0 - of.through };
+    let back = share * slab.color[0] + slab.through * (share * whole(sum) + (1.0 - share) * sum.color[0]);
+    let front = share * slab.color[1] + (1.0 - share) * (whole(slab) + slab.through * sum.color[1]);
+    Light { color: [back, front, 0.0], through: slab.through * sum.through }
 }
 
 /// Equation 9: (S_f, S_b, l) of (a, s, t).

@@ -1,6 +1,6 @@
 //! The transfer function between the values of a table's texels: what all constructions but the exact one read.
 
-use super::value;
+use super::{for_each_piece, is_scalar, value};
 use crate::integral::Exact;
 use bytemuck::{Pod, Zeroable};
 
@@ -33,6 +33,8 @@ impl Sum {
 pub(super) struct Grid {
     pub(super) size: usize,
     pub(super) direct: bool,
+    /// Colours are weights of those at a segment's ends: within an interval, the shares of it that are below and above.
+    pub(super) weights: bool,
     /// Pieces of all intervals, as a rising scalar passes them, and of which interval each is.
     pub(super) parts: Vec<Part>,
     pub(super) interval: Vec<u32>,
@@ -57,15 +59,19 @@ pub(super) fn constant(exact: &Exact<f64>, s: f64) -> [f64; 4] {
 
 impl Grid {
     pub(super) fn new(exact: &Exact<f64>, size: u32) -> Self {
-        let (mut parts, mut interval) = (Vec::new(), Vec::new());
+        let (mut parts, mut interval, weights) = (Vec::new(), Vec::new(), !is_scalar(exact));
         let mut sums = vec![[Sum::default(); 4]];
         for i in 1..size {
             let mut of = sums[i as usize - 1];
-            exact.for_each_piece(&[value(i - 1, size)], &[value(i, size)], |f, b, share| {
+            for_each_piece(exact, value(i - 1, size), value(i, size), |mut f, mut b, share| {
                 if share <= 0.0 {
                     return;
                 }
                 interval.push(i - 1);
+                if weights {
+                    // Blue is all that emits: runs of intervals are put together by it.
+                    (f[3], b[3]) = (1.0, 1.0);
+                }
                 parts.push(Part { front: f.map(|v| v as f32), back: b.map(|v| v as f32), share: share as f32 });
                 for k in 1..4 {
                     let mean = match exact.direct {
@@ -73,6 +79,10 @@ impl Grid {
                         false => (f[0] * (2.0 * f[k] + b[k]) + b[0] * (f[k] + 2.0 * b[k])) / 6.0,
                     };
                     of[k - 1] = of[k - 1].plus(share * mean);
+                }
+                if weights && !exact.direct {
+                    // From the first value on, and not from the interval's.
+                    of[0] = of[0].plus(f64::from(i - 1) * share * (f[0] + b[0]) / 2.0);
                 }
                 of[3] = of[3].plus(share * (f[0] + b[0]) / 2.0);
             });
@@ -82,6 +92,7 @@ impl Grid {
         Grid {
             size: size as usize,
             direct: exact.direct,
+            weights,
             constant: (0..size).map(|i| constant(exact, value(i, size)).map(|v| v as f32)).collect(),
             colour: (0..size).map(|i| colour(value(i, size))).collect(),
             plain: interval.len() + 1 == size as usize && (0..).zip(&interval).all(|(i, &of): (u32, _)| i == of),
@@ -94,8 +105,13 @@ impl Grid {
 
     /// What colour over opacity (direct: over the length that is seen) becomes between two values where nothing hides
     /// anything, and the mean extinction ρ̂. Which of the values is in front does not matter.
+    ///
+    /// Of weights, of a scalar that rises; of one that falls, those of both ends change places.
     #[inline(always)]
     pub(super) fn limit(&self, i: usize, j: usize) -> [f32; 4] {
+        if self.weights {
+            return self.limit_of_weights(i, j);
+        }
         if i == j {
             let [density, r, g, b] = self.constant[i];
             return [r, g, b, density];
@@ -111,6 +127,15 @@ impl Grid {
         }
         let [r, g, b] = [0, 1, 2].map(|k| (between[k] * over).max(0.0) as f32);
         [r, g, b, density]
+    }
+
+    fn limit_of_weights(&self, i: usize, j: usize) -> [f32; 4] {
+        let between = |k: usize| (self.sums[j][k] - self.sums[i][k]) + (self.rests[j][k] - self.rests[i][k]);
+        let (texels, extinction) = (j as f64 - i as f64, between(3));
+        let density = if i == j { self.constant[i][0] } else { (extinction / texels).max(0.0) as f32 };
+        let middle = (between(0) / extinction - i as f64) / texels;
+        let middle = if self.direct || !middle.is_finite() { 0.5 } else { middle.clamp(0.0, 1.0) };
+        [middle as f32, (1.0 - middle) as f32, 0.0, density]
     }
 }
 

@@ -8,7 +8,7 @@
 use super::closed::{self, Both, Runs};
 use super::grid::Grid;
 use super::volume::{OPAQUE_DEPTH, Pieces, normalised};
-use super::{between, bound_of_polynomial, is_scalar, reconstructed, value};
+use super::{between, bound_of_polynomial, for_each_piece, is_tabulated, reconstructed, value};
 use crate::integral::Exact;
 use rayon::prelude::*;
 
@@ -58,10 +58,10 @@ pub(crate) type Inverse = Vec<Vec<f64>>;
 
 impl Polynomial {
     /// Integrates `exact` over segments of up to `longest` normalised units, on the current rayon pool. `None` for
-    /// fields of several components, less than 2 texels along an axis, and degrees that are not 1 to 8: points at equal
-    /// distances give no better ones.
+    /// pairs, of which [`Exact::weights`] can be tabulated, less than 2 texels along an axis, and degrees that are not 1 to 8:
+    /// points at equal distances give no better ones.
     pub fn new(exact: &Exact<f64>, degree: u32, size: u32, longest: f64) -> Option<Self> {
-        if !is_scalar(exact) || size < 2 || !(1..=8).contains(&degree) {
+        if !is_tabulated(exact) || size < 2 || !(1..=8).contains(&degree) {
             return None;
         }
         let inverse = inverse(degree as usize);
@@ -71,7 +71,7 @@ impl Polynomial {
             .map(|at| {
                 let (front, back) = (value(at % size, size), value(at / size, size));
                 let mut pieces = Pieces::new();
-                exact.for_each_piece(&[front], &[back], |f, b, share| pieces.push((f, b, share)));
+                for_each_piece(exact, front, back, |f, b, share| pieces.push((f, b, share)));
                 let points: Vec<[f64; 4]> =
                     lengths.iter().map(|&l| normalised(exact, front, back, &pieces, l, longest * THINNEST)).collect();
                 let coefficient = |i: usize| {
@@ -93,7 +93,7 @@ impl Polynomial {
         if size < 3 || degree > 4 {
             return Self::new(exact, degree, size, longest);
         }
-        if !is_scalar(exact) || degree == 0 {
+        if !is_tabulated(exact) || degree == 0 {
             return None;
         }
         let texels = vec![vec![[0.0; 4]; size as usize * size as usize]; degree as usize + 1];
@@ -105,7 +105,7 @@ impl Polynomial {
     /// This table of another function, in the memory that it has: faster than [`Polynomial::closed`], as that is then
     /// known to be there.
     pub fn rebuild(&mut self, exact: &Exact<f64>) {
-        if is_scalar(exact) && self.size > 2 && self.degree <= 4 {
+        if is_tabulated(exact) && self.size > 2 && self.degree <= 4 {
             self.direct = exact.direct;
             self.fill(&Grid::new(exact, self.size));
         } else if let Some(new) = Self::new(exact, self.degree, self.size, self.longest) {
@@ -151,8 +151,9 @@ impl Polynomial {
                     let d = first + d;
                     runs.apart(d, scratch, &mut segments[..n - d]);
                     for (i, (both, of)) in segments[..n - d].iter_mut().zip(sheared).enumerate() {
-                        let limit = closed::normalise(grid, [i, i + d], both, most);
-                        *of = [&both.rising, &both.falling].map(|lanes| coefficients(&weights, limit, &lanes.0));
+                        let [limit, fallen] = closed::normalise(grid, [i, i + d], both, most);
+                        *of = [(&both.rising, limit), (&both.falling, fallen)]
+                            .map(|(lanes, limit)| coefficients(&weights, limit, &lanes.0));
                     }
                 },
             );

@@ -1,5 +1,7 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
+mod weights;
+
 use super::cylindrical::{coordinates, place};
 use super::*;
 use crate::field::Normal;

@@ -9,7 +9,9 @@
 
 use super::closed::{self, Both, Runs};
 use super::grid::Grid;
-use super::{Storage, between, bound_of_volume, is_scalar, light, published, reconstructed, value};
+use super::{
+    Storage, between, bound_of_volume, for_each_piece, is_scalar, is_tabulated, light, published, reconstructed, value,
+};
 use crate::integral::{Exact, Light};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -57,10 +59,10 @@ pub(super) type Pieces = Vec<([f64; 4], [f64; 4], f64)>;
 
 impl Table {
     /// Integrates `exact` over segments of up to `longest` normalised units, on the current rayon pool. `None` for
-    /// fields of several components, of which a table has no room, and for sizes that are no table: less than 2 × 2 × 3
+    /// pairs, of which [`Exact::weights`] can be tabulated, and for sizes that are no table: less than 2 × 2 × 3
     /// texels.
     pub fn new(exact: &Exact<f64>, kind: Kind, size: [u32; 3], longest: f64) -> Option<Self> {
-        if !is_scalar(exact) || size[0] < 2 || size[1] < 2 || size[2] < 3 {
+        if !is_tabulated(exact) || size[0] < 2 || size[1] < 2 || size[2] < 3 {
             return None;
         }
         let lengths: Vec<f64> = (0..size[2]).map(|k| length(kind, size[2], longest, k)).collect();
@@ -70,7 +72,7 @@ impl Table {
             .map(|at| {
                 let (front, back) = (value(at as u32 % size[0], size[0]), value(at as u32 / size[0], size[1]));
                 let mut pieces = Pieces::new();
-                exact.for_each_piece(&[front], &[back], |f, b, share| pieces.push((f, b, share)));
+                for_each_piece(exact, front, back, |f, b, share| pieces.push((f, b, share)));
                 let column = lengths.iter().map(|&l| match kind {
                     Kind::LogNormalised => normalised(exact, front, back, &pieces, l, lengths[1]),
                     _ => published(exact, front, back, l),
@@ -88,7 +90,7 @@ impl Table {
         if size[0] != size[1] || size[0] < 3 {
             return Self::new(exact, kind, size, longest);
         }
-        if !is_scalar(exact) || size[2] < 3 {
+        if !is_tabulated(exact) || size[2] < 3 {
             return None;
         }
         let texels = Storage::zeroed(size.iter().map(|&n| n as usize).product());
@@ -101,7 +103,7 @@ impl Table {
     /// to be there.
     pub fn rebuild(&mut self, exact: &Exact<f64>) {
         let [w, h, _] = self.size;
-        if is_scalar(exact) && w == h && w > 2 {
+        if is_tabulated(exact) && w == h && w > 2 {
             self.direct = exact.direct;
             self.fill(&Grid::new(exact, w));
         } else if let Some(new) = Self::new(exact, self.kind, self.size, self.longest) {
@@ -241,6 +243,10 @@ pub(super) fn normalised(
 
 /// The mean colour of a segment that may have no extinction, and so no pieces.
 fn colour_of(exact: &Exact<f64>, front: f64, back: f64, pieces: &Pieces, k: usize) -> f64 {
+    if pieces.is_empty() && !is_scalar(exact) {
+        // Half of the way, as where extinction is the same all along.
+        return if k < 3 { 0.5 } else { 0.0 };
+    }
     if pieces.is_empty() {
         return (exact.opacity.color_at(front, k) + exact.opacity.color_at(back, k)) / 2.0;
     }

@@ -40,9 +40,8 @@ fn every_program_is_valid() {
     for kind in KINDS {
         for fragments in FORMS {
             for (direct, chunks, association) in [(false, 1, "POINT"), (true, 3, "CORNER"), (false, 2, "CELL")] {
-                // Fields of several components have no tables.
-                let tables = choices().into_iter().filter(|_| kind == Kind::Scalar);
-                let tables = tables.map(|c| Some(Lookup::new(&exact(Emission::Chromatic), &c, 2.0).unwrap()));
+                let tables =
+                    choices().into_iter().map(|c| Some(Lookup::new(&exact(Emission::Chromatic), &c, 2.0).unwrap()));
                 let exact = lines(kind).into_iter().map(|l| (l, None));
                 for (i, (lines, table)) in exact.chain(tables.map(|t| (Lines::None, t))).enumerate() {
                     let switches = Switches {
@@ -211,7 +210,7 @@ fn pictures_do_not_depend_on_who_finds_the_order() {
     }
 }
 
-/// The sequence goes on from one buffer to the next.
+/// The sequence goes on from one buffer to the next, and cells and points from one binding to the next.
 #[test]
 fn orders_of_several_buffers_are_one() {
     let Some(gpu) = gpu() else { return };
@@ -223,13 +222,51 @@ fn orders_of_several_buffers_are_one() {
         renderer.set_switches(Switches { order, ..Switches::default() });
         let one = renderer.render(&view, &|_| ()).unwrap();
         let project = renderer.backend().project().unwrap();
+        let whole = project.gpu().binding;
+        assert_eq!(project.bindings(), [1; 3]);
         project.sort_on_device(false);
         project.keep_in_chunks_of(BATCH);
         let several = renderer.render(&view, &|_| ()).unwrap();
         assert!(renderer.stats().projection.unwrap().drawn_cells > BATCH as u64);
         assert!(several.compare(&one).unwrap().max < 2e-6, "{order:?}");
-        renderer.backend().project().unwrap().keep_in_chunks_of(BATCH << 6);
+        renderer.backend().project().unwrap().bind_at_most(512 << 10);
+        let spread = renderer.render(&view, &|_| ()).unwrap();
+        let project = renderer.backend().project().unwrap();
+        assert!(project.bindings()[0] > 4 && project.bindings()[1] > 1, "{:?}", project.bindings());
+        // A fragment is the same wherever its cell comes from.
+        assert!(spread == several, "{order:?}: {:e}", spread.compare(&several).unwrap().max);
+        project.keep_in_chunks_of(BATCH << 6);
+        project.bind_at_most(whole);
     }
+}
+
+/// The order of a mesh is found once for a view: edits of function and field draw by it again.
+#[test]
+fn the_order_of_a_mesh_outlives_edits() {
+    let Some(gpu) = gpu() else { return };
+    let (mut renderer, view) = prepared(Engine::Project, chosen(&gpu), 6, [32, 32]);
+    // A new sequence is found before the old one goes, so it is at another place.
+    let place = |renderer: &mut Renderer, view: &View| {
+        renderer.render(view, &|_| ()).unwrap();
+        let sorts = renderer.stats().projection.unwrap().sorts;
+        (renderer.backend().project().unwrap().sequence.as_ref().unwrap().cells.cells.as_ptr(), sorts)
+    };
+    let (first, sorts) = place(&mut renderer, &view);
+    assert_eq!(sorts, 1);
+    assert_eq!(place(&mut renderer, &view), (first, 0));
+    let everything = TransferFunction::new(vec![(0.0, [1.0; 3])], vec![(-1.0, 0.5), (1.0, 2.0)], 1.0).unwrap();
+    renderer.set_transfer(&everything);
+    assert_eq!(place(&mut renderer, &view), (first, 1));
+    let mesh = generate::tetrahedra(6);
+    renderer.set_field(&Field::new(&mesh, "c", Some(Association::Cell), Component::Index(0)).unwrap()).unwrap();
+    assert_eq!(place(&mut renderer, &view), (first, 1));
+    let camera = Camera { position: dvec3(-1.0, 2.0, 3.0), ..*view.camera().unwrap() };
+    let (second, sorts) = place(&mut renderer, &View::new(camera, [32, 32]).unwrap());
+    assert!(second != first && sorts == 1);
+    let moved: Vec<DVec3> = mesh.points().iter().map(|p| *p * 0.9).collect();
+    renderer.set_points(&moved).unwrap();
+    assert!(renderer.backend().project().unwrap().sequence.is_none());
+    assert_eq!(place(&mut renderer, &View::new(camera, [32, 32]).unwrap()).1, 1);
 }
 
 #[test]
@@ -259,7 +296,7 @@ fn ten_million_tetrahedra_are_drawn() {
     project.set_transfer(&everything);
     traverse.set_transfer(&everything);
     let (got, want) = (project.render(&view, &|_| ()).unwrap(), traverse.render(&view, &|_| ()).unwrap());
-    let bindings: usize = project.backend().project().unwrap().arrays().unwrap().iter().map(|a| a.chunks).sum();
+    let bindings: usize = project.backend().project().unwrap().bindings().iter().sum();
     let drawn = project.stats().projection.unwrap().drawn_cells;
     let error = got.compare(&want).unwrap();
     eprintln!("{bindings} bindings, {drawn} cells, error {:e}, {:?}", error.max, project.stats());

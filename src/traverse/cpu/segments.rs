@@ -52,7 +52,7 @@ impl<const N: usize> Segments<N> for One<'_> {
         let length = (to - from) as f32;
         match self.integral.table {
             None => self.batch.add(self.integral.exact, front, back, length, light),
-            Some(table) => table.add(self.integral.exact, front[N - 1], back[N - 1], length, light),
+            Some(table) => table.add_components(self.integral.exact, front, back, length, light),
         }
     }
 

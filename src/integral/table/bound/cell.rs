@@ -25,6 +25,8 @@ pub(super) struct Cell {
     /// The two ends, and how many texels these are apart at least.
     ends: [End; 2],
     apart: f64,
+    /// Colours are those of places along a segment, and not of values.
+    weights: bool,
 }
 
 /// The cells of segments that have one end in interval `i`, and the other there or in a later one. `sums` are the
@@ -68,6 +70,13 @@ pub(super) fn row<'a>(intervals: &'a [Interval], sums: &'a [f64], i: usize) -> i
 }
 
 impl Cell {
+    /// The same of weights: a colour goes from 0 to 1 along each segment.
+    pub(super) fn of_weights(self) -> Self {
+        let [density, ..] = self.hull;
+        let hull = [density, [0.0, 1.0], [0.0, 1.0], [0.0, 1.0]];
+        Cell { hull, gap_colour: 0.0, shift_colour: 0.0, weights: true, ..self }
+    }
+
     fn add(&mut self, k: &Interval) {
         let over = |x: f64| if x > 0.0 { x / k.least } else { 0.0 };
         (self.gap, self.shift) = (self.gap.max(k.gap), self.shift.max(k.shift));
@@ -137,8 +146,9 @@ impl Cell {
         let by = 1.0 + deviation(depth);
         let weights = by * self.gap_over / 2.0 + 9.0 / 32.0 * (by * over).powi(2);
         let between = self.gap_colour + contrast * weights + 9.0 / 16.0 * by * over * self.shift_colour;
+        let bent = if self.weights { f64::INFINITY } else { self.bent(depth) };
         // Without extinction there is neither.
-        [between, self.bent(depth)].iter().fold(contrast, |m, &v| if v < m { v } else { m }) * self.alpha(l)
+        [between, bent].iter().fold(contrast, |m, &v| if v < m { v } else { m }) * self.alpha(l)
     }
 
     /// Of Ĉ, by its second derivatives by its ends, `depth` being the greatest.

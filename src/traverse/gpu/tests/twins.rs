@@ -163,3 +163,41 @@ fn ten_million_tetrahedra_are_drawn() {
         got.pixels.iter().flatten().zip(want.pixels.iter().flatten()).fold(0.0, |m: f32, (g, w)| m.max((g - w).abs()));
     assert!(apart <= 2e-5, "{apart:e}");
 }
+
+/// Arrays that no single binding holds are read as one, by both engines and in the order of the mesh, whatever the field.
+#[test]
+fn arrays_of_several_bindings_are_one() {
+    let Some(choice) = choice() else { return };
+    let mesh = plain(generate::islands(11));
+    let mut random = Random(23);
+    let transfer = random_transfer(&mut random, false);
+    let view = random_view(&mut random, [40, 32]);
+    for engine in [Engine::Traverse, Engine::Project] {
+        let mut renderer = Renderer::with_engine(0, choice.clone(), engine).unwrap();
+        renderer.set_mesh(&mesh, Tetrahedra::new(&mesh).unwrap());
+        renderer.set_transfer(&transfer);
+        for (array, association) in
+            [("scalar", Association::Cell), ("pair", Association::Cell), ("rgba", Association::Point)]
+        {
+            renderer.set_field(&Field::new(&mesh, array, Some(association), Component::All).unwrap()).unwrap();
+            let [one, several] = [u64::MAX, 16 << 10].map(|bytes| {
+                let mut bindings = vec![];
+                if let Some(traverse) = renderer.backend().traverse() {
+                    traverse.bind_at_most(bytes.min(128 << 20));
+                }
+                if let Some(project) = renderer.backend().project() {
+                    project.bind_at_most(bytes.min(128 << 20));
+                }
+                let image = draw(&mut renderer, &view);
+                bindings.extend(renderer.backend().traverse().map(|t| t.bindings()));
+                bindings.extend(renderer.backend().project().map(|p| p.bindings()));
+                (image, bindings.concat())
+            });
+            assert!(one.1.iter().all(|&n| n == 1) && one.0.pixels.iter().any(|p| p[3] > 0.1), "{:?}", one.1);
+            // Cells and points; scalars of cells have room in one.
+            let spread = several.1.iter().filter(|&&n| n > 1).count();
+            assert!(spread > usize::from(array != "scalar") + 1, "{engine:?}, {array}: {:?}", several.1);
+            assert!(several.0 == one.0, "{engine:?}, {array}: {:e}", several.0.compare(&one.0).unwrap().max);
+        }
+    }
+}
