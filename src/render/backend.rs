@@ -16,9 +16,6 @@ use crate::view::Blend;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Why the walk draws where the projection on the CPU is to look up a table of a field of several components.
-const HANDED_OVER: &str = "a table is of colours that have components of their own";
-
 /// An engine, and where it runs.
 #[derive(Debug)]
 pub(crate) enum Backend {
@@ -228,11 +225,6 @@ fn walk_on<const N: usize>(traverse: &mut Traverse, frame: &Frame, values: &Valu
 fn project_by<const N: usize>(sweep: &mut Sweep, frame: &Frame, values: &Values<N>) -> Result<Drawn> {
     if *frame.switches != Switches::default() {
         return Err(Error::Device("the projection engine has variants on a graphics device only".into()));
-    }
-    if N > 1 && integral(frame).table.is_some() {
-        // Lanes know the weights of no table.
-        let sweep = SweepStats { handed_over: Some(HANDED_OVER.into()), ..SweepStats::default() };
-        return Ok(Drawn { sweep: Some(sweep), ..walk(frame, values) });
     }
     let color = |v: &[f32; N]| frame.largest(v);
     let (pixels, counts) = sweep.render(&sweep::Frame {

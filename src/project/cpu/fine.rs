@@ -239,7 +239,7 @@ impl<const N: usize> Canvas<N> {
                 self.batch.add(integral.exact, front, back, length, &mut light);
                 self.batch.flush(integral.exact.direct, &mut light);
             }
-            Some(table) => table.add(integral.exact, front[N - 1], back[N - 1], length, &mut light),
+            Some(table) => table.add_components(integral.exact, front, back, length, &mut light),
         }
         let [r, g, b] = light.color;
         let all = [r, g, b, light.through];
