@@ -14,6 +14,7 @@
 #include "vtkObjectFactory.h"
 #include "vtkPVGeometryFilter.h"
 #include "vtkPVRenderView.h"
+#include "vtkPiecewiseFunction.h"
 #include "vtkPolyDataMapper.h"
 #include "vtkUnstructuredGrid.h"
 #include "vtkVolumeProperty.h"
@@ -22,6 +23,7 @@ struct vtkHaliteVolumeRepresentation::Internals
 {
   OneGrid Input;
   SteadyGrid Drawn;
+  vtkNew<vtkPiecewiseFunction> GradientOpacity;
   vtkSmartPointer<vtkUnstructuredGrid> Grid = vtkSmartPointer<vtkUnstructuredGrid>::New();
 };
 
@@ -83,6 +85,18 @@ void vtkHaliteVolumeRepresentation::SetSpecular(double specular)
 void vtkHaliteVolumeRepresentation::SetSpecularPower(double power)
 {
   this->Property->SetSpecularPower(power);
+}
+
+void vtkHaliteVolumeRepresentation::AddGradientOpacity(double length, double opacity)
+{
+  this->Inner->GradientOpacity->AddPoint(length, opacity);
+  this->Property->SetGradientOpacity(this->Inner->GradientOpacity);
+}
+
+void vtkHaliteVolumeRepresentation::RemoveAllGradientOpacities()
+{
+  this->Inner->GradientOpacity->RemoveAllPoints();
+  this->Property->SetGradientOpacity(static_cast<vtkPiecewiseFunction*>(nullptr));
 }
 
 int vtkHaliteVolumeRepresentation::FillInputPortInformation(int port, vtkInformation* information)

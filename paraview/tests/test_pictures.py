@@ -274,6 +274,46 @@ def test_what_the_colour_editor_does():
     done(v)
 
 
+def test_categories():
+    """Numbers that stand for something: each has the colour of its category, and what is between two that of the nearer."""
+    g = lattice(4, field=lambda p: 3 * p[:, 2])
+    add(g, np.arange(64) // 16, "kind", of="cell")
+    colors = [(0.9, 0.1, 0.1), (0.1, 0.9, 0.1), (0.1, 0.2, 0.9), (0.9, 0.8, 0.1)]
+    for array, field, near in ((("CELLS", "kind"), lambda q: np.floor(q[..., 2] * 4).clip(0, 3), 2),
+                               (("POINTS", "s"), lambda q: 3 * q[..., 2], 2)):
+        v, d, plain = drawn(g, array=array)
+        d.ScalarOpacityFunction.Points = [0, 1, 0.5, 0, 3, 1, 0.5, 0]
+        d.LookupTable.InterpretValuesAsCategories = 1
+        # In no order, and one that no number is.
+        order = [2, 0, 3, 1]
+        d.LookupTable.Annotations = [x for i in order for x in (str(i), f"kind {i}")] + ["none", "of these"]
+        d.LookupTable.IndexedColors = [x for i in order for x in colors[i]] + [1, 1, 1]
+        steps = [(s, *colors[i]) for i in range(4) for s in (i - 0.5, i + 0.5)]
+        check(session.picture(v), session.truth(v, field=field, opacity=[(0, 1), (3, 1)], color=steps, steps=800), near=near,
+              what=array[1])
+        d.LookupTable.InterpretValuesAsCategories = 0
+        d.ScalarOpacityFunction.Points = [x for s, a in OPACITY for x in (s, a, 0.5, 0)]
+        assert session.apart(session.picture(v), plain) == 0
+        done(v)
+
+
+def test_opacity_by_the_gradient():
+    """The field's gradient is 1 long: the function halves the opacity there. None is none, and other mappers have none."""
+    v, d, plain = drawn(lattice(3, cells="tet"))
+    check(plain, session.truth(v, **ABOUT))
+    d.GradientOpacity = [0.5, 0, 1.5, 1]
+    check(session.picture(v), session.truth(v, factor=lambda p: 0.5, **ABOUT), what="half")
+    d.GradientOpacity = [1.5, 0, 2, 1]
+    assert session.picture(v).max() == 0
+    d.GradientOpacity = []
+    assert session.apart(session.picture(v), plain) == 0
+    d.SelectMapper = "Projected tetra"
+    theirs = session.picture(v)
+    d.GradientOpacity = [1.5, 0, 2, 1]
+    assert session.apart(session.picture(v), theirs) == 0
+    done(v)
+
+
 def test_switching_representations_and_loading_again():
     v, d, p = drawn(lattice(3, cells="mixed"))
     for other in ("Surface", "Outline", "Wireframe"):

@@ -12,9 +12,9 @@ A volume whose own mapper draws nothing carries the bounds; when it is its turn,
 camera and the depths of that moment and composited. So opaque geometry may stand before, behind and inside.
 
 What it cannot do: translucent geometry goes under the volume; several volumes go over each other in the order in which they were
-added to the renderer; VTK's ambient occlusion (SSAO) is refused with an error; exporters leave the volume out; and windows have 8
-bits for each colour. What goes wrong in a frame is raised by the window's ``Render`` that asked for it; where VTK asked itself, while
-a user drags or for a tiled screenshot, it goes to ``sys.excepthook``, and the window lives on.
+added to the renderer; VTK's ambient occlusion (SSAO) is refused with an error; exporters leave the volume out, and say nothing; and
+windows have 8 bits for each colour. What goes wrong in a frame is raised by the window's ``Render`` that asked for it; where VTK asked
+itself, while a user drags or for a tiled screenshot, it goes to ``sys.excepthook``, and the window lives on.
 """
 from __future__ import annotations
 

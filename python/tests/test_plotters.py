@@ -152,6 +152,12 @@ def test_errors_are_raised_and_the_plotter_lives_on(monkeypatch):
     volume.scalars = "other"
     p.render_window.GetInteractor().Render()
     assert len(shown) == 1 and '"other"' in str(shown[0])
+    # Where VTK asks for frames in what the user calls, for tiles too, that raises it.
+    for ask in (lambda: p.screenshot(scale=2), p.get_image_depth):
+        volume.scalars = f"no {ask}"
+        with pytest.raises(halite.Error, match='"no ') as raised:
+            ask()
+        assert str(volume.error) == str(raised.value) and len(shown) == 1
     volume.scalars = "s"
     volume.grid.GetPointData().GetArray("s").Modified()
     p.render()
