@@ -2,6 +2,8 @@
 // The grids of an input, and which of them is in front of which.
 #pragma once
 
+#include "vtkHaliteCompatibility.h"
+
 #include "halite.h"
 
 #include "vtkSmartPointer.h"

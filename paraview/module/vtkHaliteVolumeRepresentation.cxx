@@ -157,8 +157,8 @@ int vtkHaliteVolumeRepresentation::ProcessViewRequest(
     vtkPVRenderView::SetRequiresDistributedRendering(inInfo, this, true);
     vtkNew<vtkMatrix4x4> placement;
     this->Actor->GetMatrix(placement);
+    // Unlike in the superclass the volume keeps its mapper, and with that the picture, until data come that make another one.
     vtkPVRenderView::SetGeometryBounds(inInfo, this, this->DataBounds, placement);
-    this->Actor->SetMapper(nullptr);
   }
   else if (request == vtkPVView::REQUEST_UPDATE_LOD())
   {

@@ -41,6 +41,19 @@ def test_halite_is_in_the_list():
     done(v)
 
 
+def test_a_new_volume_is_drawn_once():
+    """With nothing said, ParaView updates it again after the first picture; that stays."""
+    v, producer = session.view(), session.source(lattice(3, cells="mixed"))
+    d = simple.Show(producer, v)
+    d.SetRepresentationType("Volume")
+    d.SelectMapper = "Halite"
+    simple.ColorBy(d, ("POINTS", "s"))
+    assert session.picture(v).max() > 20
+    session.picture(v)
+    assert [session.count(d, what) for what in ("Frames", "MeshUploads", "FieldUploads", "Copies")] == [1, 1, 1, 0]
+    done(v)
+
+
 def test_cells_of_all_kinds():
     for cells in ("tet", "hex", "voxel", "wedge", "mixed"):
         v, d, p = drawn(lattice(3, cells=cells))
