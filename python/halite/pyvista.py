@@ -24,7 +24,7 @@ import pyvista
 from matplotlib.colors import ListedColormap
 from pyvista.plotting.colors import get_cmap_safe
 
-from . import Error, TransferFunction
+from . import Error, Mesh, TransferFunction
 from ._window import Frames
 from .vtk import Volume
 
@@ -206,8 +206,9 @@ def add_volume(plotter: pyvista.Plotter, volume: Any, scalars: Union[str, npt.Ar
         raise ValueError(f'blending is "composite" or "maximum", and not "{blending}"')
     if isinstance(volume, pyvista.MultiBlock):
         raise Error("a MultiBlock is several grids: add each of its blocks, or what its combine() makes of them")
-    if isinstance(volume, (str, os.PathLike)):
-        raise Error("a grid is meant, and not a path: pyvista.read(path) reads one")
+    if isinstance(volume, (str, os.PathLike, Mesh)):
+        what = "halite.Mesh" if isinstance(volume, Mesh) else "path"
+        raise Error(f"a grid of PyVista or VTK is meant, and not a {what}: pyvista.read(path) reads one")
     grid = pyvista.wrap(volume)
     if scalars is not None and not isinstance(scalars, str):
         given = np.asarray(scalars)

@@ -133,6 +133,8 @@ class Volume(vtkVolume):
                  association: Optional[str] = None, component: Any = None, maximum: bool = False, coarse: int = 2, threads: int = 0,
                  device: str = "auto", engine: str = "auto", integral: Any = None, reconstruction: Optional[str] = None,
                  sampling: Optional[float] = None, gradient_array: Optional[str] = None) -> None:
+        if not hasattr(grid, "IsA"):
+            raise Error(f"a grid of VTK is meant, and not a {type(grid).__name__}: readers of VTK give one")
         _let_go()
         self.grid, self.scalars, self.association, self.component = grid, scalars, association, component
         self.maximum, self.coarse, self.frames = maximum, int(coarse), 0
