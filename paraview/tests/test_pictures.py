@@ -124,6 +124,43 @@ def test_blocks_become_one_grid():
     done(v)
 
 
+def test_partitions_become_one_grid():
+    parts = [lattice(2, high=(1, 1, 0.5)), None, lattice(2, low=(0, 0, 0.5), cells="tet")]
+    one, several = vtkCommonDataModel.vtkPartitionedDataSet(), vtkCommonDataModel.vtkPartitionedDataSetCollection()
+    for i, part in enumerate(parts):
+        one.SetPartition(i, part)
+        if part:
+            several.SetPartition(several.GetNumberOfPartitionedDataSets(), 0, part)
+    for data in (one, several):
+        v, d, p = drawn(data)
+        check(p, session.truth(v, **ABOUT), what=data.GetClassName())
+        assert session.mapper_of(d).GetInputDataObject(0, 0).GetNumberOfCells() == sum(g.GetNumberOfCells() for g in parts if g)
+        done(v)
+
+
+def test_ghost_cells_are_left_out():
+    g = lattice(4)
+    add(g, np.where(np.arange(64) // 16 == 3, 1, 0).astype(np.uint8), "vtkGhostType", of="cell")
+    v, _, p = drawn(g)
+    check(p, session.truth(v, high=(1, 1, 0.75), **ABOUT))
+    done(v)
+
+
+def test_the_unit_distance_when_nobody_says():
+    """It is that which ParaView gives its own mappers."""
+    producer, found = session.source(lattice(4, cells="tet")), []
+    for mapper in ("Projected tetra", "Halite"):
+        v = session.view()
+        d = simple.Show(producer, v)
+        d.SelectMapper = mapper
+        d.SetRepresentationType("Volume")
+        session.picture(v)
+        found.append(d.ScalarOpacityUnitDistance)
+        simple.Delete(v)
+    assert found[0] == found[1] != 1, found
+    simple.Delete(producer)
+
+
 def test_structured_grids():
     g = vtkCommonDataModel.vtkStructuredGrid()
     box = lattice(4)
@@ -367,6 +404,17 @@ def test_other_mappers_draw_as_before():
     assert session.apart(session.picture(v), theirs) == 0
     # They classify vertices, and miss what the function does between them.
     assert 5 < session.apart(theirs, ours)
+    done(v)
+
+
+def test_a_new_session_has_it():
+    """ParaView forgets its own session with all that is in it. No plugin is unloaded meanwhile; the new session reads its definitions."""
+    v, _, p = drawn(lattice(2))
+    done(v)
+    simple.ResetSession()
+    session.load()
+    v, d, q = drawn(lattice(2))
+    assert session.apart(p, q) == 0 and list(d.GetProperty("SelectMapper").GetAvailable()).count("Halite") == 1
     done(v)
 
 

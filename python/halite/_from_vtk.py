@@ -76,8 +76,10 @@ def mesh(cls: type[Mesh], grid: Any) -> Mesh:
     types = cell_types(grid)
     if types is None:
         return cls.from_arrays(points, [], [0], [], **data)
-    types = viewed(types)
-    return cls.from_arrays(points, viewed(cells.GetConnectivityArray()), viewed(cells.GetOffsetsArray()), types,
+    types, starts = viewed(types), viewed(cells.GetOffsetsArray())
+    # VTK leaves room behind what cells name, and anything in it, such as where it removed ghosts.
+    corners = viewed(cells.GetConnectivityArray())[:max(int(starts[-1]), 0)]
+    return cls.from_arrays(points, corners, starts, types,
                            faces=_faces(grid, types) if np.any(types == 42) else None, **data)
 
 

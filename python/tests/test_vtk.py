@@ -398,6 +398,21 @@ def test_cells_of_one_type(fog):
     assert (pictures[0] == pictures[1]).all() and pictures[0][..., 3].max() > 0.1
 
 
+def test_room_behind_cells_is_none_of_theirs(fog):
+    """As VTK leaves it where it removes ghosts."""
+    g = grid()
+    good = halite.Renderer(halite.Mesh.from_vtk(g), transfer=fog)
+    cells = g.GetCells()
+    corners = cells.GetConnectivityArray()
+    longer = numpy_to_vtk(np.append(vtk_to_numpy(corners).astype(np.int64), [-5, 1 << 40]), deep=1, array_type=vtkCommonCore.VTK_ID_TYPE)
+    starts = numpy_to_vtk(vtk_to_numpy(cells.GetOffsetsArray()).astype(np.int64), deep=1, array_type=vtkCommonCore.VTK_ID_TYPE)
+    more = vtkCommonDataModel.vtkCellArray()
+    more.SetData(starts, longer)
+    g.SetCells(12, more)
+    view = halite.View((3, -2.5, 2), view_up=(0, 0, 1), size=(40, 40))
+    assert (halite.Renderer(halite.Mesh.from_vtk(g), transfer=fog).render(view) == good.render(view)).all()
+
+
 def test_polyhedra():
     g = vtkCommonDataModel.vtkUnstructuredGrid()
     points, cells, offsets, types = lattice(1)
