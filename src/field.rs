@@ -166,15 +166,21 @@ impl Field {
         with_values!(&array.values, v => Self::from_slice(&array.name, v, array.components, association, component))
     }
 
-    /// The same of an array that is not needed any more: one of single values is not copied.
+    /// The same of an array that is not needed any more: one all of whose values are drawn is not copied.
     ///
     /// # Errors
     /// As [`Self::from_array`].
     pub fn taking(array: Array, association: Association, component: Component) -> Result<Self> {
-        if array.components != 1 || component == Component::Magnitude {
+        let is_whole = match component {
+            Component::Index(_) => array.components == 1,
+            Component::Magnitude => false,
+            Component::All => true,
+        };
+        if !is_whole {
             return Self::from_array(&array, association, component);
         }
-        let (kind, normal, range) = with_values!(&array.values, v => measured(&array.name, v, 1, component))?;
+        let (kind, normal, range) =
+            with_values!(&array.values, v => measured(&array.name, v, array.components, component))?;
         Ok(Field { association, kind, values: Arc::new(array.values), normal, range, second: None, missing: None })
     }
 
@@ -340,7 +346,7 @@ numbers! {
     u64, 1.0, U64; f32, 1.0, F32; f64, 1.0, F64;
 }
 
-/// The length of a tuple, without overflow for components up to 1e300.
-fn magnitude<T: Number>(tuple: &[T]) -> f64 {
+/// The Euclidean length of a tuple, without overflow for components up to 1e300.
+pub fn magnitude<T: Number>(tuple: &[T]) -> f64 {
     tuple.iter().fold(0.0, |m: f64, x| m.hypot(x.to_f64()))
 }

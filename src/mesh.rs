@@ -10,6 +10,7 @@ pub use attributes::{Attributes, LeftOut, Role};
 use crate::error::{Error, Result};
 use glam::DVec3;
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// The values of a data array, in the type that the file or host holds them in. Tuples lie one after another.
 #[derive(Debug, Clone, PartialEq)]
@@ -205,12 +206,12 @@ impl Polyhedra {
 }
 
 /// An unstructured grid: a value of this type cannot be malformed. Point coordinates may still be NaN or infinite:
-/// cells that touch such a point are left out when the cells are split.
+/// cells that touch such a point are left out when the cells are split. Clones share points and cells.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Mesh {
-    points: Vec<DVec3>,
-    cells: Cells,
-    polyhedra: Option<Polyhedra>,
+    points: Arc<Vec<DVec3>>,
+    cells: Arc<Cells>,
+    polyhedra: Option<Arc<Polyhedra>>,
     point_arrays: Vec<Array>,
     cell_arrays: Vec<Array>,
     point_attributes: Attributes,
@@ -262,15 +263,16 @@ impl Mesh {
         point_arrays.iter().try_for_each(|a| check_array("point", a, points.len()))?;
         cell_arrays.iter().try_for_each(|a| check_array("cell", a, n))?;
         let [point_attributes, cell_attributes] = Default::default();
+        let (points, cells) = (Arc::new(points), Arc::new(cells));
         Ok(Mesh { points, cells, polyhedra: None, point_arrays, cell_arrays, point_attributes, cell_attributes })
     }
 
     /// Takes it apart.
     pub(crate) fn into_parts(self) -> MeshParts {
         MeshParts {
-            points: self.points,
-            cells: self.cells,
-            polyhedra: self.polyhedra,
+            points: Arc::unwrap_or_clone(self.points),
+            cells: Arc::unwrap_or_clone(self.cells),
+            polyhedra: self.polyhedra.map(Arc::unwrap_or_clone),
             arrays: [self.point_arrays, self.cell_arrays],
             attributes: [self.point_attributes, self.cell_attributes],
         }
@@ -310,7 +312,7 @@ impl Mesh {
             let count = self.points.len();
             return Err(Error::Mesh(format!("the face of a polyhedron names point {p}, but there are {count} points")));
         }
-        self.polyhedra = Some(polyhedra);
+        self.polyhedra = Some(Arc::new(polyhedra));
         Ok(())
     }
 
@@ -342,7 +344,7 @@ impl Mesh {
         if !by.is_finite() || by.cmpeq(DVec3::ZERO).any() {
             return Err(Error::Mesh(format!("it cannot be stretched by {by}")));
         }
-        self.points.par_iter_mut().for_each(|p| *p *= by);
+        Arc::make_mut(&mut self.points).par_iter_mut().for_each(|p| *p *= by);
         Ok(self)
     }
 
@@ -350,10 +352,10 @@ impl Mesh {
     pub(crate) fn bytes(&self) -> u64 {
         let values = |array: &Array| with_values!(&array.values, v => size_of_val(&**v));
         let arrays: usize = self.point_arrays.iter().chain(&self.cell_arrays).map(values).sum();
-        let Cells { types, offsets, connectivity } = &self.cells;
+        let Cells { types, offsets, connectivity } = &*self.cells;
         let cells = size_of_val(&**types) + size_of_val(&**offsets) + size_of_val(&**connectivity);
         let faces = |p: &Polyhedra| size_of_val(&*p.cells) + size_of_val(&*p.faces) + size_of_val(&*p.points);
-        (size_of_val(&*self.points) + arrays + cells + self.polyhedra.as_ref().map_or(0, faces)) as u64
+        (size_of_val(&*self.points) + arrays + cells + self.polyhedra.as_deref().map_or(0, faces)) as u64
     }
 
     /// The points, in world coordinates.
@@ -373,7 +375,7 @@ impl Mesh {
 
     /// The faces of its polyhedra.
     pub fn polyhedra(&self) -> Option<&Polyhedra> {
-        self.polyhedra.as_ref()
+        self.polyhedra.as_deref()
     }
 
     /// The arrays with a value for each point.
@@ -397,15 +399,19 @@ impl Mesh {
     }
 }
 
-/// Checks that an array of points or cells, which `kind` says, has values for `count` of them.
 pub(crate) fn check_array(kind: &str, a: &Array, count: usize) -> Result<()> {
-    if a.components > 0 && count.checked_mul(a.components) == Some(a.values.len()) {
+    check_length(kind, &a.name, a.components, a.values.len(), count)
+}
+
+/// Checks that an array called `name` of points or cells, which `kind` says, has `components` values for each of `count` of them.
+///
+/// # Errors
+/// [`Error::Mesh`] if its `length` is another.
+pub fn check_length(kind: &str, name: &str, components: usize, length: usize, count: usize) -> Result<()> {
+    if components > 0 && count.checked_mul(components) == Some(length) {
         return Ok(());
     }
     Err(Error::Mesh(format!(
-        "{kind} array \"{}\" has {} values, not {} components for each of {count} {kind}s",
-        a.name,
-        a.values.len(),
-        a.components
+        "{kind} array \"{name}\" has {length} values, not {components} components for each of {count} {kind}s"
     )))
 }

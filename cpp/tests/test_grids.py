@@ -299,6 +299,54 @@ def test_a_mapper_takes_one_kind_after_the_other():
     assert len(errors) == 0
 
 
+def blocks():
+    """The rectilinear grid in four, of which one lacks its array in a block of its own, and an empty one."""
+    whole = vtkCommonDataModel.vtkMultiBlockDataSet()
+    for x in (slice(0, 2), slice(1, 4)):
+        for z in (slice(0, 3), slice(2, 5)):
+            g = vtkCommonDataModel.vtkRectilinearGrid()
+            kept = [x, slice(0, 3), z]
+            g.SetDimensions(*(len(AXES[a][kept[a]]) for a in range(3)))
+            for name, axis, part in zip("XYZ", AXES, kept):
+                getattr(g, f"Set{name}Coordinates")(numpy_support.numpy_to_vtk(axis[part].copy(), deep=1))
+            add(g, VALUES[z, :, x].ravel())
+            whole.SetBlock(whole.GetNumberOfBlocks(), g)
+    bare = image()
+    bare.GetPointData().Initialize()
+    bare.SetOrigin(5, 5, 5)
+    for other in (bare, vtkCommonDataModel.vtkImageData()):
+        whole.SetBlock(whole.GetNumberOfBlocks(), other)
+    return whole
+
+
+def test_several_grids_of_one_input():
+    m = np.array([[0.8, -0.5, 0, 0.3], [0.5, 0.8, 0.1, -0.2], [0, 0.2, -1.1, 1.0], [0, 0, 0, 1]])
+    for matrix in (np.eye(4), m):
+        v = volume(rectilinear(), LOW, RAMP, 0.5)
+        v.GetMapper().SetInputDataObject(blocks())
+        errors = messages(v.GetMapper())
+        v.SetUserMatrix(transform(matrix))
+        w, r = expect(v, AXES, trilinear(AXES), matrix=matrix)
+        assert not errors and v.GetMapper().GetNumberOfFrames() == 4
+        pixels(w)
+        assert v.GetMapper().GetNumberOfFrames() == 4, "a still picture"
+        for angle in (100, 80):
+            r.GetActiveCamera().Azimuth(angle)
+            r.GetActiveCamera().SetParallelProjection(angle == 80)
+            r.ResetCameraClippingRange()
+            box = {"low": [a[0] for a in AXES], "high": [a[-1] for a in AXES]}
+            check(pixels(w), truth(r, WINDOW, **box, field=trilinear(AXES), matrix=matrix, **LOOK), what=f"from {angle}")
+    bounds = np.reshape(v.GetMapper().GetBounds(), (3, 2))
+    assert np.allclose(bounds[:, 0], [a[0] for a in AXES]) and bounds[0, 1] > 5, "all blocks"
+    v.GetMapper().SetBlendModeToMaximumIntensity()
+    pixels(w)
+    assert len(errors) == 1 and "maximum" in errors[0]
+    # One grid again.
+    v.GetMapper().SetBlendModeToComposite()
+    v.GetMapper().SetInputData(rectilinear())
+    check(pixels(w), truth(r, WINDOW, **box, field=trilinear(AXES), matrix=m, **LOOK))
+
+
 def test_volumes_of_images_keep_working():
     """A volume that was made for VTK's own mapper of images shows about the same with this one."""
     axes = axes_of((0.3, 0.5, 0.25))

@@ -199,6 +199,24 @@ def test_hidden_and_ghost_cells():
     check(pixels(w), truth(r, (64, 64), opacity=TENT), what="hidden points")
 
 
+def test_removed_cells_leave_room():
+    """VTK removes ghosts from a grid and leaves room, with anything in it, behind what cells name."""
+    g = half_grid()
+    add(g, np.array([0, 1], np.uint8), "vtkGhostType", "cell")
+    g.RemoveGhostCells()
+    w, r = scene(volume(g, TENT), clip=(0.1, 20))
+    check(pixels(w), truth(r, (64, 64), opacity=TENT), what="removed")
+    g = half_grid()
+    cells = g.GetCells()
+    corners = numpy_support.vtk_to_numpy(cells.GetConnectivityArray()).astype(np.int64)
+    starts = numpy_support.vtk_to_numpy(cells.GetOffsetsArray()).astype(np.int64)
+    roomy = vtkCommonDataModel.vtkCellArray()
+    roomy.SetData(*(numpy_support.numpy_to_vtkIdTypeArray(a, deep=1) for a in (starts, np.append(corners, [-7, 1 << 40]))))
+    g.SetCells(VOXEL, roomy)
+    w, r = scene(volume(g, TENT), clip=(0.1, 20))
+    check(pixels(w), truth(r, (64, 64), high=(1, 1, 2), opacity=TENT), what="with room")
+
+
 def test_blanked_cells_change():
     g = half_grid()
     ghosts = add(g, np.array([0, 32], np.uint8), "vtkGhostType", "cell")

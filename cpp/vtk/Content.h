@@ -22,6 +22,8 @@ struct Content
   // How the core is to work.
   halite::Settings Settings;
   vtkSmartPointer<vtkDataSet> Grid;
+  // Which grid of the input it is.
+  std::size_t Place = 0;
   // Whether the core has it as a grid, and then whether the value of the nearest point is drawn.
   bool IsGrid = false;
   bool IsNearest = false;

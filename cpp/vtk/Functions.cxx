@@ -3,6 +3,7 @@
 
 #include "vtkColorTransferFunction.h"
 #include "vtkPiecewiseFunction.h"
+#include "vtkVariant.h"
 #include "vtkVolumeProperty.h"
 
 #include <algorithm>
@@ -153,6 +154,39 @@ std::vector<std::vector<Value>> TablesOf(vtkColorTransferFunction* function, con
   return tables;
 }
 
+// Where values are categories: the colour of the one that is nearest, of those that are numbers.
+Functions::Color CategoriesOf(vtkColorTransferFunction* function)
+{
+  std::vector<Knot> categories;
+  for (vtkIdType i = 0; i < function->GetNumberOfAnnotatedValues(); ++i)
+  {
+    bool isNumber = false;
+    const double value = function->GetAnnotatedValue(i).ToDouble(&isNumber);
+    if (isNumber && std::isfinite(value))
+    {
+      double rgba[4];
+      function->GetIndexedColor(i, rgba);
+      categories.push_back({ value, { rgba[0], rgba[1], rgba[2] } });
+    }
+  }
+  std::stable_sort(categories.begin(), categories.end(), [](const Knot& a, const Knot& b) { return a.s < b.s; });
+  Functions::Color color;
+  for (std::size_t i = 0; i < categories.size(); ++i)
+  {
+    if (i > 0)
+    {
+      const double between = categories[i - 1].s + (categories[i].s - categories[i - 1].s) / 2;
+      color.push_back({ between, categories[i - 1].value });
+      color.push_back({ between, categories[i].value });
+    }
+    else
+    {
+      color.push_back({ categories[i].s, categories[i].value });
+    }
+  }
+  return color;
+}
+
 }
 
 namespace Functions
@@ -160,6 +194,14 @@ namespace Functions
 
 Color KnotsOf(vtkColorTransferFunction* function)
 {
+  if (function->GetIndexedLookup())
+  {
+    const Color categories = CategoriesOf(function);
+    if (!categories.empty())
+    {
+      return categories;
+    }
+  }
   std::vector<double> nodes;
   for (int i = 0; i < function->GetSize(); ++i)
   {

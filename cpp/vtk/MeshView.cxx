@@ -212,6 +212,12 @@ halite::Mesh MeshView::Mesh(vtkDataSet* base)
       types = this->Numbers(cellTypes);
       offsets = this->Numbers(cells->GetOffsetsArray());
       connectivity = this->Numbers(cells->GetConnectivityArray());
+      // VTK leaves room behind what cells name, and anything in it, such as where it removed ghosts.
+      const double end = cells->GetOffsetsArray()->GetComponent(cells->GetNumberOfCells(), 0);
+      if (end >= 0 && end < static_cast<double>(connectivity.count))
+      {
+        connectivity.count = static_cast<std::size_t>(end);
+      }
     }
   }
   else

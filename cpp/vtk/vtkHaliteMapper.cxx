@@ -5,8 +5,11 @@
 #include "Peeling.h"
 #include "vtkHaliteMapperInternals.h"
 
+#include "vtkBoundingBox.h"
+#include "vtkCompositeDataSet.h"
 #include "vtkDataSet.h"
 #include "vtkInformation.h"
+#include "vtkMath.h"
 #include "vtkObjectFactory.h"
 #include "vtkOpenGLActor.h"
 #include "vtkOpenGLRenderPass.h"
@@ -80,11 +83,32 @@ int vtkHaliteMapper::FillInputPortInformation(int port, vtkInformation* informat
   {
     return 0;
   }
-  for (const char* kind : { "vtkImageData", "vtkRectilinearGrid", "vtkStructuredGrid" })
+  for (const char* kind : { "vtkImageData", "vtkRectilinearGrid", "vtkStructuredGrid", "vtkCompositeDataSet" })
   {
     information->Append(vtkAlgorithm::INPUT_REQUIRED_DATA_TYPE(), kind);
   }
   return 1;
+}
+
+double* vtkHaliteMapper::GetBounds()
+{
+  auto blocks = vtkCompositeDataSet::SafeDownCast(this->GetInputDataObject(0, 0));
+  if (!blocks)
+  {
+    return this->Superclass::GetBounds();
+  }
+  this->Update();
+  vtkBoundingBox all;
+  for (const Block& block : Block::Of(blocks))
+  {
+    all.AddBounds(block.Grid->GetBounds());
+  }
+  vtkMath::UninitializeBounds(this->Bounds);
+  if (all.IsValid())
+  {
+    all.GetBounds(this->Bounds);
+  }
+  return this->Bounds;
 }
 
 bool vtkHaliteMapper::IsSupported(vtkRenderWindow* window)
@@ -149,13 +173,14 @@ void vtkHaliteMapper::Internals::DrawIn(vtkOpenGLRenderWindow* window, vtkRender
       return;
     }
   }
-  const vtkSmartPointer<vtkDataSet> grid = vtkDataSet::SafeDownCast(this->Self.GetInputDataObject(0, 0));
-  if (!grid || !volume->GetProperty())
+  const vtkSmartPointer<vtkDataObject> input = this->Self.GetInputDataObject(0, 0);
+  if (!input || !volume->GetProperty())
   {
     this->ErrorOnce("there is no grid to draw: SetInputData or SetInputConnection gives the mapper one");
     return;
   }
-  if (grid->GetNumberOfCells() == 0)
+  const std::vector<Block> blocks = Block::Of(input);
+  if (blocks.empty())
   {
     return;
   }
@@ -174,7 +199,7 @@ void vtkHaliteMapper::Internals::DrawIn(vtkOpenGLRenderWindow* window, vtkRender
     {
       throw std::runtime_error("the window has no OpenGL context: Render() of the window makes one");
     }
-    const Content content = this->Choose(grid, volume, renderer, isMaximum);
+    const std::vector<Content> contents = this->Choose(blocks, volume, renderer, isMaximum);
     // Where surfaces end rays there is nothing between two pixels.
     const double distance = pass ? 1 : this->SampleDistance();
     SceneView view(renderer, static_cast<int>(std::ceil(viewport.Width / distance)),
@@ -183,9 +208,13 @@ void vtkHaliteMapper::Internals::DrawIn(vtkOpenGLRenderWindow* window, vtkRender
     {
       std::array<double, 6> planes;
       std::copy_n(this->Self.CroppingRegionPlanes, 6, planes.begin());
-      view.Crop(planes, this->Self.CroppingRegionFlags, content.Placement);
+      view.Crop(planes, this->Self.CroppingRegionFlags, contents.front().Placement);
     }
-    wanted << content.Whole() << view.Key << static_cast<std::uint64_t>(this->Self.RoundingUp);
+    for (const Content& content : contents)
+    {
+      wanted << content.Whole() << static_cast<std::uint64_t>(content.Place);
+    }
+    wanted << view.Key << static_cast<std::uint64_t>(this->Self.RoundingUp);
     if (this->Failed == wanted)
     {
       return;
@@ -198,8 +227,8 @@ void vtkHaliteMapper::Internals::DrawIn(vtkOpenGLRenderWindow* window, vtkRender
       frame.Pictured = wanted;
     }
     Presenter& presenter = this->PresenterOf(window);
-    if (pass ? this->Peel(content, view, presenter, frame, pass)
-             : this->Show(content, view, viewport, presenter, frame))
+    if (pass ? this->Peel(contents, view, presenter, frame, pass)
+             : this->Show(contents, view, viewport, presenter, frame))
     {
       this->Errors.clear();
       this->Failed = Key();
@@ -279,43 +308,43 @@ int vtkHaliteMapper::GetNumberOfWidgets()
 
 vtkIdType vtkHaliteMapper::GetNumberOfFrames()
 {
-  return this->Inner->Core.GetCounts().Frames;
+  return this->Inner->Cores.GetCounts().Frames;
 }
 
 vtkIdType vtkHaliteMapper::GetNumberOfMeshUploads()
 {
-  return this->Inner->Core.GetCounts().Meshes;
+  return this->Inner->Cores.GetCounts().Meshes;
 }
 
 vtkIdType vtkHaliteMapper::GetNumberOfPointUploads()
 {
-  return this->Inner->Core.GetCounts().Points;
+  return this->Inner->Cores.GetCounts().Points;
 }
 
 vtkIdType vtkHaliteMapper::GetNumberOfFieldUploads()
 {
-  return this->Inner->Core.GetCounts().Fields;
+  return this->Inner->Cores.GetCounts().Fields;
 }
 
 vtkIdType vtkHaliteMapper::GetNumberOfFunctionUploads()
 {
-  return this->Inner->Core.GetCounts().Functions;
+  return this->Inner->Cores.GetCounts().Functions;
 }
 
 vtkIdType vtkHaliteMapper::GetNumberOfCopies()
 {
-  return this->Inner->Core.GetCounts().Copies;
+  return this->Inner->Cores.GetCounts().Copies;
 }
 
 const char* vtkHaliteMapper::GetAdapter()
 {
-  this->Inner->Adapter = this->Inner->Core.GetStatistics().adapter;
+  this->Inner->Adapter = this->Inner->Cores.GetStatistics().adapter;
   return this->Inner->Adapter.c_str();
 }
 
 vtkIdType vtkHaliteMapper::GetNumberOfTetrahedra()
 {
-  return static_cast<vtkIdType>(this->Inner->Core.GetStatistics().tetrahedra);
+  return static_cast<vtkIdType>(this->Inner->Cores.GetStatistics().tetrahedra);
 }
 
 void vtkHaliteMapper::PrintSelf(ostream& os, vtkIndent indent)

@@ -52,9 +52,19 @@ public:
 
   ///@{
   /**
+   * Of all that is drawn: (xmin, xmax, ymin, ymax, zmin, zmax).
+   */
+  double* GetBounds() VTK_SIZEHINT(6) override;
+  using vtkProjectedTetrahedraMapper::GetBounds;
+  ///@}
+
+  ///@{
+  /**
    * What is drawn: a vtkUnstructuredGrid, vtkImageData, vtkRectilinearGrid or vtkStructuredGrid. Image data and rectilinear grids
    * are drawn as the trilinear fields that they are, by the CPU, whatever the Device; with the interpolation type of the property
-   * nearest (which is its default) as the value of the nearest point, unless points or cells are hidden.
+   * nearest (which is its default) as the value of the nearest point, unless points or cells are hidden. A composite data set of image
+   * data and rectilinear grids (SetInputConnection, SetInputDataObject) is drawn grid by grid, the nearest first: right where boxes
+   * around them do not overlap and none hides another in a circle. Grids without the array are left out; a maximum is of one grid.
    */
   void SetInputData(vtkDataSet* grid) override;
   void SetInputData(vtkUnstructuredGridBase* grid) override;

@@ -11,6 +11,8 @@
 #include "vtkCommand.h"
 #include "vtkDataArray.h"
 #include "vtkDataSet.h"
+#include "vtkMatrix4x4.h"
+#include "vtkNew.h"
 #include "vtkOpenGLRenderPass.h"
 #include "vtkOpenGLRenderWindow.h"
 #include "vtkPointData.h"
@@ -41,7 +43,7 @@ void vtkHaliteMapper::Internals::WarnOnce(const std::string& what)
 
 void vtkHaliteMapper::Internals::ReportWarnings()
 {
-  for (const std::string& warning : this->Core.TakeWarnings())
+  for (const std::string& warning : this->Cores.TakeWarnings())
   {
     vtkWarningWithObjectMacro(&this->Self, << warning);
   }
@@ -170,7 +172,8 @@ void vtkHaliteMapper::Internals::Shade(Content& content, vtkVolume* volume, vtkR
   }
 }
 
-Content vtkHaliteMapper::Internals::Choose(vtkDataSet* grid, vtkVolume* volume, vtkRenderer* renderer, bool isMaximum)
+std::vector<Content> vtkHaliteMapper::Internals::Choose(
+  std::vector<Block> blocks, vtkVolume* volume, vtkRenderer* renderer, bool isMaximum)
 {
   Clock clock(this->Self.PrepareTime);
   halite::Settings settings;
@@ -188,15 +191,46 @@ Content vtkHaliteMapper::Internals::Choose(vtkDataSet* grid, vtkVolume* volume, 
   integral.iterations = this->Self.TableIterations;
   integral.reconstruction = Text(this->Self.Reconstruction);
   integral.sampleDistance = this->Self.SampleDistance;
-  int cellFlag = 0;
-  vtkDataArray* array = vtkAbstractMapper::GetScalars(
-    grid, this->Self.ScalarMode, this->Self.ArrayAccessMode, this->Self.ArrayId, this->Self.ArrayName, cellFlag);
-  const bool isSlab = this->Self.OpacityConvention == vtkHaliteMapper::OPACITY ||
-    (this->Self.OpacityConvention == vtkHaliteMapper::BY_INPUT && MeshView::IsGrid(grid));
-  const auto convention = isSlab ? halite::OpacityConvention::Opacity : halite::OpacityConvention::Extinction;
-  Content content(settings, grid, array, cellFlag, volume, convention, this->Knots);
-  this->Shade(content, volume, renderer, isMaximum);
-  return content;
+  const bool areSeveral = blocks.size() > 1;
+  if (areSeveral)
+  {
+    if (isMaximum ||
+      !std::all_of(blocks.begin(), blocks.end(), [](const Block& b) { return MeshView::IsGrid(b.Grid); }))
+    {
+      throw halite::Error("of several grids, image data and rectilinear grids are drawn together, and no maximum is: "
+                          "vtkAppendFilter makes one of others");
+    }
+    vtkNew<vtkMatrix4x4> matrix;
+    vtkHaliteCompatibility::GetMatrix(volume, matrix);
+    halite::Renderer::Matrix placement;
+    std::copy_n(matrix->GetData(), 16, placement.begin());
+    Block::Sort(blocks, renderer, placement);
+  }
+  std::vector<Content> contents;
+  const auto add = [&](const Block& block, vtkDataArray* array, int cellFlag) {
+    const bool isSlab = this->Self.OpacityConvention == vtkHaliteMapper::OPACITY ||
+      (this->Self.OpacityConvention == vtkHaliteMapper::BY_INPUT && MeshView::IsGrid(block.Grid));
+    const auto convention = isSlab ? halite::OpacityConvention::Opacity : halite::OpacityConvention::Extinction;
+    contents.emplace_back(settings, block.Grid, array, cellFlag, volume, convention, this->Knots);
+    contents.back().Place = block.Place;
+    this->Shade(contents.back(), volume, renderer, isMaximum);
+  };
+  for (const Block& block : blocks)
+  {
+    int cellFlag = 0;
+    vtkDataArray* array = vtkAbstractMapper::GetScalars(block.Grid, this->Self.ScalarMode, this->Self.ArrayAccessMode,
+      this->Self.ArrayId, this->Self.ArrayName, cellFlag);
+    // Blocks may lack what others have.
+    if (array || !areSeveral)
+    {
+      add(block, array, cellFlag);
+    }
+  }
+  if (contents.empty())
+  {
+    add(blocks.front(), nullptr, 0);
+  }
+  return contents;
 }
 
 void vtkHaliteMapper::Internals::Mend()
@@ -214,18 +248,18 @@ void vtkHaliteMapper::Internals::Mend()
   }
 }
 
-bool vtkHaliteMapper::Internals::Draw(
-  const Content& content, const halite::View& view, vtkOpenGLRenderWindow* window, std::vector<float>& pixels)
+bool vtkHaliteMapper::Internals::Draw(const std::vector<Content>& contents, const halite::View& view,
+  vtkOpenGLRenderWindow* window, std::vector<float>& pixels)
 {
   {
     Clock clock(this->Self.PrepareTime);
-    this->Core.Hold(content);
+    this->Cores.Hold(contents);
   }
   std::string thrown;
   bool finished;
   {
     Clock clock(this->Self.CoreTime);
-    finished = this->Core.Draw(view, pixels, [&](double share) {
+    finished = this->Cores.Draw(view, pixels, [&](double share) {
       // What observers throw stays here: VTK's windows never draw again if an exception leaves a frame.
       try
       {
@@ -267,7 +301,7 @@ void RoundUp(std::vector<float>& pixels)
 }
 
 bool vtkHaliteMapper::Internals::Show(
-  const Content& content, SceneView& view, const Viewport& viewport, Presenter& presenter, Frame& frame)
+  const std::vector<Content>& contents, SceneView& view, const Viewport& viewport, Presenter& presenter, Frame& frame)
 {
   vtkRenderer* renderer = frame.Renderer;
   const int width = static_cast<int>(view.View.width), height = static_cast<int>(view.View.height);
@@ -290,7 +324,7 @@ bool vtkHaliteMapper::Internals::Show(
     frame.Layers.Clear();
     frame.Depths.swap(depths);
     view.View.depths = frame.Depths;
-    if (!this->Draw(content, view.View, presenter.GetWindow(), this->Pixels))
+    if (!this->Draw(contents, view.View, presenter.GetWindow(), this->Pixels))
     {
       return false;
     }
@@ -309,7 +343,7 @@ bool vtkHaliteMapper::Internals::Show(
 }
 
 bool vtkHaliteMapper::Internals::Peel(
-  const Content& content, SceneView& view, Presenter& presenter, Frame& frame, vtkOpenGLRenderPass* pass)
+  const std::vector<Content>& contents, SceneView& view, Presenter& presenter, Frame& frame, vtkOpenGLRenderPass* pass)
 {
   vtkRenderer* renderer = frame.Renderer;
   vtkVolume* volume = frame.Volume;
@@ -329,7 +363,7 @@ bool vtkHaliteMapper::Internals::Peel(
   const bool isComplete =
     frame.Layers.Complete(intervals, [&](const std::vector<float>& ends, std::vector<float>& pixels) {
       view.View.depths = ends;
-      return this->Draw(content, view.View, presenter.GetWindow(), pixels);
+      return this->Draw(contents, view.View, presenter.GetWindow(), pixels);
     });
   if (!isComplete)
   {

@@ -2,8 +2,9 @@
 // What the mapper keeps between frames, and the steps of one.
 #pragma once
 
+#include "Blocks.h"
 #include "Content.h"
-#include "Core.h"
+#include "Cores.h"
 #include "Key.h"
 #include "Layers.h"
 #include "Presenter.h"
@@ -73,7 +74,7 @@ struct vtkHaliteMapper::Internals
   static std::string Text(const char* s) { return s ? s : ""; }
 
   vtkHaliteMapper& Self;
-  ::Core Core;
+  ::Cores Cores;
   Functions::Cache Knots;
   std::list<Frame> Frames;
   std::list<Presenter> Presenters;
@@ -139,7 +140,8 @@ struct vtkHaliteMapper::Internals
   Frame& FrameOf(vtkRenderer* renderer, vtkVolume* volume);
   // Lets go what was made for a window: at once, or when the frame that is at work is over.
   void Release(vtkWindow* window);
-  Content Choose(vtkDataSet* grid, vtkVolume* volume, vtkRenderer* renderer, bool isMaximum);
+  // What is drawn of each grid, the nearest first.
+  std::vector<Content> Choose(std::vector<Block> blocks, vtkVolume* volume, vtkRenderer* renderer, bool isMaximum);
   // Between rays, in pixels.
   double SampleDistance() const;
   // Draws once the renderer has finished.
@@ -152,12 +154,14 @@ struct vtkHaliteMapper::Internals
   void DrawIn(vtkOpenGLRenderWindow* window, vtkRenderer* renderer, vtkVolume* volume);
 
   // These are false if what they draw was given up. By the core:
-  bool Draw(
-    const Content& content, const halite::View& view, vtkOpenGLRenderWindow* window, std::vector<float>& pixels);
+  bool Draw(const std::vector<Content>& contents, const halite::View& view, vtkOpenGLRenderWindow* window,
+    std::vector<float>& pixels);
   // Into the window, as one picture:
-  bool Show(const Content& content, SceneView& view, const Viewport& viewport, Presenter& presenter, Frame& frame);
+  bool Show(const std::vector<Content>& contents, SceneView& view, const Viewport& viewport, Presenter& presenter,
+    Frame& frame);
   // Into the layers of a pass of depth peeling:
-  bool Peel(const Content& content, SceneView& view, Presenter& presenter, Frame& frame, vtkOpenGLRenderPass* pass);
+  bool Peel(const std::vector<Content>& contents, SceneView& view, Presenter& presenter, Frame& frame,
+    vtkOpenGLRenderPass* pass);
 };
 
 VTK_ABI_NAMESPACE_END

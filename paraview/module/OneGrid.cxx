@@ -9,6 +9,7 @@
 #include "vtkExtractBlockUsingDataAssembly.h"
 #include "vtkIdTypeArray.h"
 #include "vtkMergeBlocks.h"
+#include "vtkPartitionedDataSet.h"
 #include "vtkUnsignedCharArray.h"
 #include "vtkUnstructuredGrid.h"
 
@@ -68,10 +69,16 @@ vtkSmartPointer<vtkUnstructuredGrid> OneGrid::Of(vtkDataObject* input)
   auto grid = vtkSmartPointer<vtkUnstructuredGrid>::New();
   if (vtkCompositeDataSet::SafeDownCast(input))
   {
-    this->Blocks->SetInputData(input);
-    this->Blocks->Update();
+    vtkDataObject* chosen = input;
+    // Partitions of one data set are no blocks that could be chosen.
+    if (!vtkPartitionedDataSet::SafeDownCast(input))
+    {
+      this->Blocks->SetInputData(input);
+      this->Blocks->Update();
+      chosen = this->Blocks->GetOutputDataObject(0);
+    }
     vtkNew<vtkMergeBlocks> merge;
-    if (vtkUnstructuredGrid* merged = Merged(this->Blocks->GetOutputDataObject(0), merge))
+    if (vtkUnstructuredGrid* merged = Merged(chosen, merge))
     {
       grid->ShallowCopy(merged);
     }

@@ -4,13 +4,15 @@
 #include "AnyGridVolume.h"
 #include "vtkHaliteMapper.h"
 
+#include "vtkCompositeDataIterator.h"
+#include "vtkCompositeDataSet.h"
 #include "vtkDataObject.h"
 #include "vtkDataSet.h"
 #include "vtkInformation.h"
 #include "vtkMatrix4x4.h"
 #include "vtkObjectFactory.h"
 #include "vtkPVRenderView.h"
-#include "vtkPartitionedDataSet.h"
+#include "vtkPiecewiseFunction.h"
 #include "vtkPlane.h"
 #include "vtkPlaneCollection.h"
 #include "vtkPolyDataMapper.h"
@@ -19,11 +21,13 @@
 
 #include <array>
 #include <string>
+#include <vector>
 
 struct vtkHaliteImageVolumeRepresentation::Internals
 {
   vtkNew<AnyGridVolume> Volume;
   vtkSmartPointer<vtkHaliteMapper> Mapper;
+  vtkNew<vtkPiecewiseFunction> GradientOpacity;
   bool IsChosen = false;
   bool HasWarned = false;
   // The mapper's own second array while that of the representation takes its place.
@@ -83,26 +87,33 @@ int vtkHaliteImageVolumeRepresentation::ProcessViewRequest(
 namespace
 {
 
-// What a mapper of one grid can take of what was delivered: the grid, or the only one of several partitions. Else null.
-vtkDataSet* OnlyGrid(vtkDataObject* delivered)
+// The core draws each with threads of its own.
+constexpr std::size_t MostGrids = 64;
+
+// The grids with cells of what was delivered.
+std::vector<vtkDataSet*> GridsOf(vtkDataObject* delivered)
 {
-  if (auto partitions = vtkPartitionedDataSet::SafeDownCast(delivered))
-  {
-    vtkDataSet* only = nullptr;
-    for (unsigned int i = 0; i < partitions->GetNumberOfPartitions(); ++i)
+  std::vector<vtkDataSet*> grids;
+  const auto add = [&grids](vtkDataObject* leaf) {
+    vtkDataSet* grid = vtkDataSet::SafeDownCast(leaf);
+    if (grid && grid->GetNumberOfCells() > 0)
     {
-      if (vtkDataSet* partition = partitions->GetPartition(i))
-      {
-        if (only)
-        {
-          return nullptr;
-        }
-        only = partition;
-      }
+      grids.push_back(grid);
     }
-    return only;
+  };
+  if (auto composite = vtkCompositeDataSet::SafeDownCast(delivered))
+  {
+    const auto leaves = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
+    for (leaves->InitTraversal(); !leaves->IsDoneWithTraversal(); leaves->GoToNextItem())
+    {
+      add(leaves->GetCurrentDataObject());
+    }
   }
-  return vtkDataSet::SafeDownCast(delivered);
+  else
+  {
+    add(delivered);
+  }
+  return grids;
 }
 
 // Planes around a box that a matrix moves, whose inside is in front of each.
@@ -130,38 +141,62 @@ vtkSmartPointer<vtkPlaneCollection> Around(const std::array<double, 6>& box, vtk
 
 }
 
-vtkDataSet* vtkHaliteImageVolumeRepresentation::Connect(vtkHaliteMapper* halite)
+bool vtkHaliteImageVolumeRepresentation::Connect(vtkHaliteMapper* halite)
 {
   // A client of a server that renders has no input.
   if (!halite || this->VolumeMapper->GetNumberOfInputConnections(0) == 0)
   {
-    return nullptr;
+    return false;
   }
   vtkDataObject* delivered = this->VolumeMapper->GetInputDataObject(0, 0);
-  vtkDataSet* grid = OnlyGrid(delivered);
-  if (grid && grid == delivered)
+  const std::vector<vtkDataSet*> grids = GridsOf(delivered);
+  if (grids.empty())
   {
-    halite->SetInputConnection(this->VolumeMapper->GetInputConnection(0, 0));
+    return false;
   }
-  else if (grid)
+  if (grids.size() == 1 && grids.front() != delivered)
   {
-    halite->SetInputData(grid);
+    halite->SetInputData(grids.front());
+    return true;
   }
-  else if (delivered && !this->Inner->HasWarned)
+  const bool isMaximum = this->VolumeMapper->GetBlendMode() == vtkVolumeMapper::MAXIMUM_INTENSITY_BLEND ||
+    halite->GetBlendMode() == vtkUnstructuredGridVolumeMapper::MAXIMUM_INTENSITY_BLEND;
+  if (grids.size() > MostGrids || (grids.size() > 1 && isMaximum))
   {
-    vtkWarningMacro(
-      "Halite draws one image or rectilinear grid, not several partitions: ParaView's own mapper draws these");
-    this->Inner->HasWarned = true;
+    if (!this->Inner->HasWarned)
+    {
+      vtkWarningMacro("Halite draws up to "
+        << MostGrids
+        << " images or rectilinear grids together, and a maximum of one: ParaView's own mapper draws these "
+        << grids.size());
+      this->Inner->HasWarned = true;
+    }
+    return false;
   }
-  return grid;
+  halite->SetInputConnection(this->VolumeMapper->GetInputConnection(0, 0));
+  return true;
+}
+
+void vtkHaliteImageVolumeRepresentation::AddGradientOpacity(double length, double opacity)
+{
+  this->Inner->GradientOpacity->AddPoint(length, opacity);
+  this->Modified();
+}
+
+void vtkHaliteImageVolumeRepresentation::RemoveAllGradientOpacities()
+{
+  this->Inner->GradientOpacity->RemoveAllPoints();
+  this->Modified();
 }
 
 void vtkHaliteImageVolumeRepresentation::UpdateMapperParameters()
 {
   Internals& inner = *this->Inner;
   vtkHaliteMapper* halite = vtkHaliteMapper::SafeDownCast(this->GetActiveVolumeMapper());
-  const bool draws = this->Connect(halite) != nullptr;
+  const bool draws = this->Connect(halite);
   inner.Volume->Prefer(draws ? halite : nullptr);
+  const bool hasGradientOpacity = draws && inner.GradientOpacity->GetSize() > 0;
+  this->Property->SetGradientOpacity(hasGradientOpacity ? inner.GradientOpacity.Get() : nullptr);
   this->Superclass::UpdateMapperParameters();
   if (!draws)
   {

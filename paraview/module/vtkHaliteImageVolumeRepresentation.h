@@ -4,7 +4,8 @@
  * @brief   volumes of image data and rectilinear grids, with Halite among the mappers
  *
  * ParaView's representation, which has one mapper of its own. Where Halite is chosen vtkHaliteMapper draws the grid as it is, with the same
- * array, functions, light and cropping. Isosurfaces and slices, which are blend modes here, stay with ParaView's mapper.
+ * array, functions, light and cropping; several partitions are drawn one after another. Isosurfaces and slices, which are blend modes
+ * here, maxima of several partitions, and more than 64 of these stay with ParaView's mapper.
  *
  * @sa
  * vtkHaliteMapper vtkHaliteVolumeRepresentation
@@ -44,6 +45,14 @@ public:
    */
   vtkAbstractVolumeMapper* GetActiveVolumeMapper();
 
+  ///@{
+  /**
+   * Adds a point to the opacity by the length of the gradient, which multiplies that by the value; without points there is none.
+   */
+  void AddGradientOpacity(double length, double opacity);
+  void RemoveAllGradientOpacities();
+  ///@}
+
 protected:
   vtkHaliteImageVolumeRepresentation();
   ~vtkHaliteImageVolumeRepresentation() override;
@@ -54,8 +63,8 @@ private:
   vtkHaliteImageVolumeRepresentation(const vtkHaliteImageVolumeRepresentation&) = delete;
   void operator=(const vtkHaliteImageVolumeRepresentation&) = delete;
 
-  // Gives the mapper the grid that was delivered, and returns that; null if it can take none.
-  vtkDataSet* Connect(vtkHaliteMapper* halite);
+  // Gives the mapper what was delivered; false if it cannot draw that.
+  bool Connect(vtkHaliteMapper* halite);
 
   struct Internals;
   std::unique_ptr<Internals> Inner;

@@ -14,6 +14,7 @@
 #include "vtkObjectFactory.h"
 #include "vtkPVGeometryFilter.h"
 #include "vtkPVRenderView.h"
+#include "vtkPiecewiseFunction.h"
 #include "vtkPolyDataMapper.h"
 #include "vtkUnstructuredGrid.h"
 #include "vtkVolumeProperty.h"
@@ -22,6 +23,7 @@ struct vtkHaliteVolumeRepresentation::Internals
 {
   OneGrid Input;
   SteadyGrid Drawn;
+  vtkNew<vtkPiecewiseFunction> GradientOpacity;
   vtkSmartPointer<vtkUnstructuredGrid> Grid = vtkSmartPointer<vtkUnstructuredGrid>::New();
 };
 
@@ -85,6 +87,18 @@ void vtkHaliteVolumeRepresentation::SetSpecularPower(double power)
   this->Property->SetSpecularPower(power);
 }
 
+void vtkHaliteVolumeRepresentation::AddGradientOpacity(double length, double opacity)
+{
+  this->Inner->GradientOpacity->AddPoint(length, opacity);
+  this->Property->SetGradientOpacity(this->Inner->GradientOpacity);
+}
+
+void vtkHaliteVolumeRepresentation::RemoveAllGradientOpacities()
+{
+  this->Inner->GradientOpacity->RemoveAllPoints();
+  this->Property->SetGradientOpacity(static_cast<vtkPiecewiseFunction*>(nullptr));
+}
+
 int vtkHaliteVolumeRepresentation::FillInputPortInformation(int port, vtkInformation* information)
 {
   if (!this->Superclass::FillInputPortInformation(port, information))
@@ -143,8 +157,8 @@ int vtkHaliteVolumeRepresentation::ProcessViewRequest(
     vtkPVRenderView::SetRequiresDistributedRendering(inInfo, this, true);
     vtkNew<vtkMatrix4x4> placement;
     this->Actor->GetMatrix(placement);
+    // Unlike in the superclass the volume keeps its mapper, and with that the picture, until data come that make another one.
     vtkPVRenderView::SetGeometryBounds(inInfo, this, this->DataBounds, placement);
-    this->Actor->SetMapper(nullptr);
   }
   else if (request == vtkPVView::REQUEST_UPDATE_LOD())
   {

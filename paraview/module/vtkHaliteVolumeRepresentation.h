@@ -48,6 +48,15 @@ public:
   void SetSpecularPower(double power);
   ///@}
 
+  ///@{
+  /**
+   * Adds a point to the opacity by the length of the gradient, which multiplies that by the value; without points there is none. As
+   * light, it is of Halite alone.
+   */
+  void AddGradientOpacity(double length, double opacity);
+  void RemoveAllGradientOpacities();
+  ///@}
+
 protected:
   vtkHaliteVolumeRepresentation();
   ~vtkHaliteVolumeRepresentation() override;

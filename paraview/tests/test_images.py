@@ -82,6 +82,86 @@ def test_the_mapper_of_before_is_the_default():
     done(v)
 
 
+def pieces(cuts, ghosts=0):
+    """The image as images of its own between cuts along each axis, with layers of ghosts of their neighbours."""
+    whole = image()
+    blocks = vtkCommonDataModel.vtkMultiBlockDataSet()
+    spans = [list(zip([0, *c], [*c, 4])) for c in cuts]
+    for x in spans[0]:
+        for y in spans[1]:
+            for z in spans[2]:
+                grown = [e for low, high in (x, y, z) for e in (max(low - ghosts, 0), min(high + ghosts, 4))]
+                piece = vtkCommonDataModel.vtkImageData()
+                piece.SetExtent(*grown)
+                piece.SetSpacing(*whole.GetSpacing())
+                valued(piece, lambda p: p[:, 2], "s")
+                if ghosts:
+                    marks = [[low <= i < high for i in range(grown[2 * a], grown[2 * a + 1])] for a, (low, high) in enumerate((x, y, z))]
+                    own = np.einsum("k,j,i->kji", *[np.array(m, int) for m in reversed(marks)]).ravel()
+                    add(piece, (1 - own).astype(np.uint8), "vtkGhostType", of="cell")
+                blocks.SetBlock(blocks.GetNumberOfBlocks(), piece)
+    return blocks
+
+
+def test_several_images():
+    """Blocks are drawn one behind another, from wherever they are seen: the picture is that of one image, but for the rounding."""
+    about = {**ABOUT}
+    eyes = [(2.1, -1.7, 2.9), (-1.6, 2.4, -1.9), (0.5, 0.45, 3.5)]
+    for cuts, ghosts in ((([2], [], []), 0), (([1, 3], [2], [1]), 0), (([2], [2], [2]), 1)):
+        for eye in eyes:
+            v = session.view(position=eye, up=(0, 1, 0) if eye[0] == 0.5 else (0, 0, 1))
+            v.CameraParallelProjection = int(eye == eyes[1])
+            v.CameraParallelScale = 1.2
+            d = session.show(session.source(pieces(cuts, ghosts)), v, color=COLOR, opacity=OPACITY)
+            check(session.picture(v), session.truth(v, **about), what=f"{cuts} with {ghosts} ghosts from {eye}")
+            assert session.mapper_of(d).GetClassName() == "vtkHaliteMapper"
+            session.picture(v)
+            grids = (len(cuts[0]) + 1) * (len(cuts[1]) + 1) * (len(cuts[2]) + 1)
+            assert session.count(d, "Frames") == grids and session.count(d, "MeshUploads") == grids
+            done(v)
+    # A plane inside, opaque and peeled: beside one image, in the same window.
+    v = session.view()
+    d = session.show(session.source(pieces([[1, 3], [2], [1]])), v, color=COLOR, opacity=OPACITY)
+    one = session.show(session.source(image()), v, color=COLOR, opacity=OPACITY)
+    plane = simple.Show(simple.Plane(Origin=[-0.2, -0.2, 0.4], Point1=[1.2, -0.2, 0.6], Point2=[-0.2, 1.2, 0.4]), v)
+
+    def both():
+        pictures = []
+        for d.Visibility in (0, 1):
+            one.Visibility = 1 - d.Visibility
+            pictures.append(session.picture(v))
+        return pictures
+
+    plane.Visibility = 0
+    alone = both()
+    assert session.apart(*alone) <= 1
+    plane.Visibility = 1
+    for plane.Opacity in (1, 0.5):
+        pictures = both()
+        assert session.apart(*pictures) <= 2 and session.apart(pictures[1], alone[1]) > 20, plane.Opacity
+    # A maximum has no front and back.
+    plane.Visibility = 0
+    d.HaliteBlendMode = "Maximum"
+    session.picture(v)
+    assert session.mapper_of(d).GetClassName() == "vtkMultiBlockVolumeMapper"
+    d.HaliteBlendMode = "Composite"
+    assert session.apart(session.picture(v), alone[1]) == 0
+    done(v)
+
+
+def test_opacity_by_the_gradient():
+    v, d, plain = drawn(image())
+    d.GradientOpacity = [0.5, 0, 1.5, 1]
+    check(session.picture(v), session.truth(v, factor=lambda p: 0.5, **ABOUT), what="half")
+    d.SelectMapper = "By rendering mode"
+    theirs = session.picture(v)
+    d.GradientOpacity = []
+    assert session.apart(session.picture(v), theirs) == 0
+    d.SelectMapper = "Halite"
+    assert session.apart(session.picture(v), plain) == 0
+    done(v)
+
+
 def test_values_of_cells():
     g = image()
     layer = (np.arange(64) // 16 + 0.5) / 4
@@ -190,6 +270,7 @@ def test_every_setting_is_kept_in_a_saved_state():
         for name, (value, _) in settings.items():
             assert held(d, name) != value, f"{name} is tested with its default"
             setattr(d, "Halite" + name, value)
+        d.GradientOpacity = [0.5, 0, 1.5, 1]
         # Values that make no picture are kept, too.
         d.Visibility = 0
         simple.SaveState(state)
@@ -200,6 +281,7 @@ def test_every_setting_is_kept_in_a_saved_state():
         assert d.SelectMapper == "Halite"
         for name, (value, _) in settings.items():
             assert held(d, name) == value, (name, held(d, name))
+        assert list(d.GradientOpacity) == [0.5, 0, 1.5, 1]
         d.HaliteWidgets, d.HaliteTransfer2DYAxisArray, d.HaliteIntegral = [], "", "exact"
         d.Visibility = 1
         session.picture(v)

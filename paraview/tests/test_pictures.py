@@ -41,6 +41,19 @@ def test_halite_is_in_the_list():
     done(v)
 
 
+def test_a_new_volume_is_drawn_once():
+    """With nothing said, ParaView updates it again after the first picture; that stays."""
+    v, producer = session.view(), session.source(lattice(3, cells="mixed"))
+    d = simple.Show(producer, v)
+    d.SetRepresentationType("Volume")
+    d.SelectMapper = "Halite"
+    simple.ColorBy(d, ("POINTS", "s"))
+    assert session.picture(v).max() > 20
+    session.picture(v)
+    assert [session.count(d, what) for what in ("Frames", "MeshUploads", "FieldUploads", "Copies")] == [1, 1, 1, 0]
+    done(v)
+
+
 def test_cells_of_all_kinds():
     for cells in ("tet", "hex", "voxel", "wedge", "mixed"):
         v, d, p = drawn(lattice(3, cells=cells))
@@ -109,6 +122,43 @@ def test_blocks_become_one_grid():
     d.BlockSelectors = ["/Root/Block0"]
     check(session.picture(v), session.truth(v, high=(1, 1, 0.5), **ABOUT))
     done(v)
+
+
+def test_partitions_become_one_grid():
+    parts = [lattice(2, high=(1, 1, 0.5)), None, lattice(2, low=(0, 0, 0.5), cells="tet")]
+    one, several = vtkCommonDataModel.vtkPartitionedDataSet(), vtkCommonDataModel.vtkPartitionedDataSetCollection()
+    for i, part in enumerate(parts):
+        one.SetPartition(i, part)
+        if part:
+            several.SetPartition(several.GetNumberOfPartitionedDataSets(), 0, part)
+    for data in (one, several):
+        v, d, p = drawn(data)
+        check(p, session.truth(v, **ABOUT), what=data.GetClassName())
+        assert session.mapper_of(d).GetInputDataObject(0, 0).GetNumberOfCells() == sum(g.GetNumberOfCells() for g in parts if g)
+        done(v)
+
+
+def test_ghost_cells_are_left_out():
+    g = lattice(4)
+    add(g, np.where(np.arange(64) // 16 == 3, 1, 0).astype(np.uint8), "vtkGhostType", of="cell")
+    v, _, p = drawn(g)
+    check(p, session.truth(v, high=(1, 1, 0.75), **ABOUT))
+    done(v)
+
+
+def test_the_unit_distance_when_nobody_says():
+    """It is that which ParaView gives its own mappers."""
+    producer, found = session.source(lattice(4, cells="tet")), []
+    for mapper in ("Projected tetra", "Halite"):
+        v = session.view()
+        d = simple.Show(producer, v)
+        d.SelectMapper = mapper
+        d.SetRepresentationType("Volume")
+        session.picture(v)
+        found.append(d.ScalarOpacityUnitDistance)
+        simple.Delete(v)
+    assert found[0] == found[1] != 1, found
+    simple.Delete(producer)
 
 
 def test_structured_grids():
@@ -274,6 +324,46 @@ def test_what_the_colour_editor_does():
     done(v)
 
 
+def test_categories():
+    """Numbers that stand for something: each has the colour of its category, and what is between two that of the nearer."""
+    g = lattice(4, field=lambda p: 3 * p[:, 2])
+    add(g, np.arange(64) // 16, "kind", of="cell")
+    colors = [(0.9, 0.1, 0.1), (0.1, 0.9, 0.1), (0.1, 0.2, 0.9), (0.9, 0.8, 0.1)]
+    for array, field, near in ((("CELLS", "kind"), lambda q: np.floor(q[..., 2] * 4).clip(0, 3), 2),
+                               (("POINTS", "s"), lambda q: 3 * q[..., 2], 2)):
+        v, d, plain = drawn(g, array=array)
+        d.ScalarOpacityFunction.Points = [0, 1, 0.5, 0, 3, 1, 0.5, 0]
+        d.LookupTable.InterpretValuesAsCategories = 1
+        # In no order, and one that no number is.
+        order = [2, 0, 3, 1]
+        d.LookupTable.Annotations = [x for i in order for x in (str(i), f"kind {i}")] + ["none", "of these"]
+        d.LookupTable.IndexedColors = [x for i in order for x in colors[i]] + [1, 1, 1]
+        steps = [(s, *colors[i]) for i in range(4) for s in (i - 0.5, i + 0.5)]
+        check(session.picture(v), session.truth(v, field=field, opacity=[(0, 1), (3, 1)], color=steps, steps=800), near=near,
+              what=array[1])
+        d.LookupTable.InterpretValuesAsCategories = 0
+        d.ScalarOpacityFunction.Points = [x for s, a in OPACITY for x in (s, a, 0.5, 0)]
+        assert session.apart(session.picture(v), plain) == 0
+        done(v)
+
+
+def test_opacity_by_the_gradient():
+    """The field's gradient is 1 long: the function halves the opacity there. None is none, and other mappers have none."""
+    v, d, plain = drawn(lattice(3, cells="tet"))
+    check(plain, session.truth(v, **ABOUT))
+    d.GradientOpacity = [0.5, 0, 1.5, 1]
+    check(session.picture(v), session.truth(v, factor=lambda p: 0.5, **ABOUT), what="half")
+    d.GradientOpacity = [1.5, 0, 2, 1]
+    assert session.picture(v).max() == 0
+    d.GradientOpacity = []
+    assert session.apart(session.picture(v), plain) == 0
+    d.SelectMapper = "Projected tetra"
+    theirs = session.picture(v)
+    d.GradientOpacity = [1.5, 0, 2, 1]
+    assert session.apart(session.picture(v), theirs) == 0
+    done(v)
+
+
 def test_switching_representations_and_loading_again():
     v, d, p = drawn(lattice(3, cells="mixed"))
     for other in ("Surface", "Outline", "Wireframe"):
@@ -314,6 +404,17 @@ def test_other_mappers_draw_as_before():
     assert session.apart(session.picture(v), theirs) == 0
     # They classify vertices, and miss what the function does between them.
     assert 5 < session.apart(theirs, ours)
+    done(v)
+
+
+def test_a_new_session_has_it():
+    """ParaView forgets its own session with all that is in it. No plugin is unloaded meanwhile; the new session reads its definitions."""
+    v, _, p = drawn(lattice(2))
+    done(v)
+    simple.ResetSession()
+    session.load()
+    v, d, q = drawn(lattice(2))
+    assert session.apart(p, q) == 0 and list(d.GetProperty("SelectMapper").GetAvailable()).count("Halite") == 1
     done(v)
 
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ._mesh import Mesh
 
 
-def _numpy(array: Any) -> Any:
+def viewed(array: Any) -> Any:
     """VTK's array as numpy's, without a copy but of arrays that are not in one piece."""
     from vtkmodules.util.numpy_support import vtk_to_numpy
     return vtk_to_numpy(array)  # type: ignore[no-untyped-call]
@@ -44,12 +44,12 @@ def _data(attributes: Any) -> dict[str, Any]:
             continue
         name = array.GetName() or ("scalars" if array is active else "")
         if name and name not in arrays:
-            arrays[name] = _numpy(array)
+            arrays[name] = array
     # What curved cells are made by is found by its name, whatever the array is called.
     for role in ("HigherOrderDegrees", "RationalWeights"):
         array = getattr(attributes, f"Get{role}")()
         if array is not None and role not in arrays and array.GetNumberOfTuples():
-            arrays[role] = _numpy(array)
+            arrays[role] = array
     return arrays
 
 
@@ -66,8 +66,8 @@ def mesh(cls: type[Mesh], grid: Any) -> Mesh:
         return cls.image(grid.GetDimensions(), origin=grid.GetOrigin(), spacing=grid.GetSpacing(), direction=direction,
                          extent_start=grid.GetExtent()[::2], **data)
     if kind == "vtkRectilinearGrid":
-        return cls.rectilinear(*(_numpy(getattr(grid, f"Get{a}Coordinates")()) for a in "XYZ"), **data)
-    points = _numpy(grid.GetPoints().GetData()) if grid.GetPoints() else np.zeros((0, 3))
+        return cls.rectilinear(*(viewed(getattr(grid, f"Get{a}Coordinates")()) for a in "XYZ"), **data)
+    points = viewed(grid.GetPoints().GetData()) if grid.GetPoints() else np.zeros((0, 3))
     if kind == "vtkStructuredGrid":
         dimensions = [0, 0, 0]
         grid.GetDimensions(dimensions)
@@ -76,8 +76,10 @@ def mesh(cls: type[Mesh], grid: Any) -> Mesh:
     types = cell_types(grid)
     if types is None:
         return cls.from_arrays(points, [], [0], [], **data)
-    types = _numpy(types)
-    return cls.from_arrays(points, _numpy(cells.GetConnectivityArray()), _numpy(cells.GetOffsetsArray()), types,
+    types, starts = viewed(types), viewed(cells.GetOffsetsArray())
+    # VTK leaves room behind what cells name, and anything in it, such as where it removed ghosts.
+    corners = viewed(cells.GetConnectivityArray())[:max(int(starts[-1]), 0)]
+    return cls.from_arrays(points, corners, starts, types,
                            faces=_faces(grid, types) if np.any(types == 42) else None, **data)
 
 
@@ -101,8 +103,8 @@ def _faces(grid: Any, types: Any) -> Optional[Sequence[Any]]:
         of_cells, faces = grid.GetPolyhedronFaceLocations(), grid.GetPolyhedronFaces()
         if of_cells is None or faces is None:
             return None
-        starts, ids = _numpy(of_cells.GetOffsetsArray()), _numpy(of_cells.GetConnectivityArray())
-        offsets, all_points = _numpy(faces.GetOffsetsArray()), _numpy(faces.GetConnectivityArray())
+        starts, ids = viewed(of_cells.GetOffsetsArray()), viewed(of_cells.GetConnectivityArray())
+        offsets, all_points = viewed(faces.GetOffsetsArray()), viewed(faces.GetConnectivityArray())
         sizes = np.diff(offsets)[ids]
         chosen = np.concatenate([[0], np.cumsum(sizes)])
         at = np.repeat(offsets[ids], sizes) + np.arange(chosen[-1]) - np.repeat(chosen[:-1], sizes)
@@ -110,7 +112,7 @@ def _faces(grid: Any, types: Any) -> Optional[Sequence[Any]]:
     stream, locations = grid.GetFaces(), grid.GetFaceLocations()
     if stream is None or locations is None:
         return None
-    stream, locations = _numpy(stream), _numpy(locations)
+    stream, locations = viewed(stream), viewed(locations)
     first, ends = [0], [0]
     points: list[Any] = []
     for cell in range(len(types)):

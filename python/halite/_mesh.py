@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NoReturn, Optional, Union
 
 import numpy as np
@@ -62,8 +62,30 @@ def native(values: npt.ArrayLike) -> npt.NDArray[Any]:
     return np.ascontiguousarray(array)
 
 
-def _arrays(data: Optional[Arrays]) -> list[tuple[str, npt.NDArray[Any]]]:
-    return [(str(name), native(values)) for name, values in (data or {}).items()]
+def _arrays(data: Optional[Arrays]) -> list[tuple[str, Any]]:
+    """Arrays of numpy and VTK by name, as they are; of what is neither, numpy's."""
+    return [(str(name), values if _is_vtks(values) else np.asarray(values)) for name, values in (data or {}).items()]
+
+
+def _is_vtks(array: Any) -> bool:
+    """Whether it is an array of VTK, whose memory moves when VTK resizes it."""
+    return not isinstance(array, np.ndarray) and hasattr(array, "GetVoidPointer")
+
+
+def numbers(array: Any) -> npt.NDArray[Any]:
+    """The values of an array of numpy or VTK, where they are at this moment if they are in one piece."""
+    if _is_vtks(array):
+        from . import _from_vtk
+        array = _from_vtk.viewed(array)
+    return native(array)
+
+
+def components(array: Any) -> int:
+    """Values of an array of numpy or VTK for each point or cell."""
+    return int(array.GetNumberOfComponents()) if _is_vtks(array) else int(np.prod(array.shape[1:]))
+
+
+_Given = list[tuple[str, npt.NDArray[Any]]]
 
 
 def _whole(what: str, numbers: npt.ArrayLike) -> npt.NDArray[Any]:
@@ -73,6 +95,21 @@ def _whole(what: str, numbers: npt.ArrayLike) -> npt.NDArray[Any]:
     if not np.issubdtype(array.dtype, np.integer):
         raise Error(f"{what} are whole numbers, and not {array.dtype}")
     return array
+
+
+def _given(data: tuple[Sequence[tuple[str, Any]], Sequence[tuple[str, Any]]]) -> tuple[_Given, _Given]:
+    """The arrays of a mesh, as the compiled module reads them."""
+    points, cells = ([(name, numbers(array)) for name, array in arrays] for arrays in data)
+    return points, cells
+
+
+def range_of(values: npt.NDArray[Any], component: Union[int, str, None]) -> tuple[float, float]:
+    """The least and the greatest finite value that is drawn."""
+    if values.ndim > 1:
+        values = values[:, component] if isinstance(component, int) else np.linalg.norm(values, axis=-1)
+    if values.size and not (np.isfinite(values.min()) and np.isfinite(values.max())):
+        values = values[np.isfinite(values)]
+    return (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
 
 
 def as_mesh(mesh: Any) -> Mesh:
@@ -87,13 +124,15 @@ def as_mesh(mesh: Any) -> Mesh:
 class Mesh:
     """A mesh, or a regular or rectilinear grid, with its arrays.
 
-    It is made by :func:`read`, :meth:`from_arrays`, :meth:`from_vtk`, :meth:`image` or :meth:`rectilinear`, and never changes: it has
-    a copy of the arrays that it is made of. Threads may share it.
+    It is made by :func:`read`, :meth:`from_arrays`, :meth:`from_vtk`, :meth:`image` or :meth:`rectilinear`. Its points and cells never
+    change. Threads may share it.
 
     Parameters
     ----------
     core : halite._halite.Mesh
         The compiled mesh. Programs call the functions above.
+    data : two lists of (name, array)
+        The arrays of points and of cells that it is drawn by, if they are not its own.
 
     See Also
     --------
@@ -101,9 +140,11 @@ class Mesh:
 
     Notes
     -----
-    What is given in one piece is read where it is, whatever its type of number, and copied once: coordinates become doubles,
-    indices 32 bits, and values keep their type. The copy is what lets drawing go on in other threads while the program writes
-    to its arrays. :meth:`Renderer.set_scalars` takes new values alone.
+    Points and cells are read where they are, and copied once: coordinates become doubles, indices 32 bits. Arrays of values are not
+    copied. The mesh refers to them, and a renderer reads the one that it draws when it begins to, in :class:`Renderer`,
+    :meth:`Renderer.set_mesh` or :meth:`Renderer.set_scalars`: it keeps that component alone. So what a program writes to an array
+    shows from the next :meth:`Renderer.set_scalars` on, and frames are drawn while the program writes. Meshes of files have arrays of
+    their own.
 
     Examples
     --------
@@ -113,8 +154,14 @@ class Mesh:
     (4, 1, (0.0, 1.0, 0.0, 1.0, 0.0, 1.0))
     """
 
-    def __init__(self, core: _halite.Mesh) -> None:
+    def __init__(self, core: _halite.Mesh, data: tuple[Sequence[tuple[str, Any]], Sequence[tuple[str, Any]]] = ((), ())) -> None:
         self._core = core
+        self._data = data
+
+    @classmethod
+    def _of(cls, make: Callable[[_Given, _Given], _halite.Mesh], point_data: Optional[Arrays], cell_data: Optional[Arrays]) -> Mesh:
+        data = (_arrays(point_data), _arrays(cell_data))
+        return cls(make(*_given(data)), data)
 
     @classmethod
     def from_arrays(cls, points: npt.ArrayLike, cells: npt.ArrayLike, offsets: npt.ArrayLike, types: npt.ArrayLike, *,
@@ -137,7 +184,7 @@ class Mesh:
             Of polyhedra: where the faces of each cell start, and the end, of shape (m + 1,); where the points of each face
             start, and the end; and those points.
         point_data : dict of str to array, optional
-            Arrays of shape (n,) or (n, k), of integers or floats of any size, by name. NaN is no value.
+            Arrays of shape (n,) or (n, k), of integers or floats of any size, by name; they are referred to. NaN is no value.
         cell_data : dict of str to array, optional
             Likewise of shape (m,) or (m, k).
 
@@ -151,7 +198,7 @@ class Mesh:
         Error
             If a count, an index, a type or a shape does not fit.
         MemoryError
-            If there is no memory for the copy.
+            If there is no memory for the copy of points and cells.
 
         Examples
         --------
@@ -166,8 +213,8 @@ class Mesh:
         if coordinates.ndim != 2:
             raise Error(f"points have {coordinates.ndim} dimensions, and not the shape (n, 3)")
         polyhedra = None if faces is None else [_whole("faces", a) for a in faces]
-        return cls(_halite.Mesh.from_arrays(coordinates, _whole("cells", cells), _whole("offsets", offsets), _whole("types", types),
-                                            polyhedra, _arrays(point_data), _arrays(cell_data)))
+        corners, starts, kinds = _whole("cells", cells), _whole("offsets", offsets), _whole("types", types)
+        return cls._of(lambda p, c: _halite.Mesh.from_arrays(coordinates, corners, starts, kinds, polyhedra, p, c), point_data, cell_data)
 
     @classmethod
     def image(cls, dimensions: Sequence[int], *, origin: Sequence[float] = (0, 0, 0), spacing: Sequence[float] = (1, 1, 1),
@@ -209,9 +256,9 @@ class Mesh:
         <halite.Mesh: a grid of 24 points and 6 cells>
         """
         rows = [[float(x) for x in row] for row in np.asarray(direction)]
-        return cls(_halite.Mesh.image(
+        return cls._of(lambda p, c: _halite.Mesh.image(
             [float(x) for x in origin], [float(x) for x in spacing], rows, [int(i) for i in extent_start],
-            [int(n) for n in dimensions], _arrays(point_data), _arrays(cell_data)))
+            [int(n) for n in dimensions], p, c), point_data, cell_data)
 
     @classmethod
     def rectilinear(cls, x: npt.ArrayLike, y: npt.ArrayLike, z: npt.ArrayLike, *, point_data: Optional[Arrays] = None,
@@ -247,13 +294,14 @@ class Mesh:
         (0.0, 3.0, 0.0, 1.0, 0.0, 2.0)
         """
         axes = [[float(c) for c in np.asarray(a).ravel()] for a in (x, y, z)]
-        return cls(_halite.Mesh.rectilinear(axes, _arrays(point_data), _arrays(cell_data)))
+        return cls._of(lambda p, c: _halite.Mesh.rectilinear(axes, p, c), point_data, cell_data)
 
     @classmethod
     def from_vtk(cls, grid: Any) -> Mesh:
         """Make a mesh of a grid of VTK or PyVista.
 
-        VTK's arrays are read where they are, and copied once. Halite imports neither package by itself.
+        VTK's points and cells are read where they are, and copied once; its arrays of values are referred to. Halite imports neither
+        package by itself.
 
         Parameters
         ----------
@@ -314,7 +362,8 @@ class Mesh:
     @property
     def arrays(self) -> list[tuple[str, str, int]]:
         """Name, "point" or "cell", and number of components of each array."""
-        return self._core.array_list
+        given = [(n, kind, components(a)) for kind, all_of in zip(("point", "cell"), self._data) for n, a in all_of]
+        return given or self._core.array_list
 
     def range(self, name: Optional[str] = None, association: Optional[str] = None,
               component: Optional[int] = None) -> tuple[float, float]:
@@ -345,8 +394,15 @@ class Mesh:
         (0.0, 7.0)
         """
         name, of_cells = self._find(name, association)
+        given = self._numbers(name, of_cells)
+        if given is not None:
+            return range_of(given, component)
         low, high = self._core.range(name, of_cells, component)
         return (low, high) if low <= high else (0.0, 0.0)
+
+    def _numbers(self, name: str, of_cells: bool) -> Optional[npt.NDArray[Any]]:
+        """The values of an array that is not the compiled mesh's own."""
+        return next((numbers(a) for n, a in self._data[of_cells] if n == name), None)
 
     def _find(self, name: Optional[str], association: Optional[str]) -> tuple[str, bool]:
         arrays = [(n, of == "cell") for n, of, _ in self.arrays if association is None or of == association]

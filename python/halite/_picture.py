@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _halite
-from ._mesh import as_mesh, read
+from ._mesh import _given, as_mesh, read
 from ._renderer import Renderer
 from ._transfer import TransferFunction
 from ._view import View
@@ -150,7 +150,7 @@ def show(mesh: Any, scalars: Optional[str] = None, *, size: Sequence[int] = (102
         mesh = read(mesh)
     mesh = as_mesh(mesh)
     wanted = None if scalars is None else mesh._find(scalars, options.get("association"))
-    name, of_cells, core, transfer = _halite.automatic(mesh._core, wanted, [int(n) for n in size])
+    name, of_cells, core, transfer = _halite.automatic(mesh._core, *_given(mesh._data), wanted, [int(n) for n in size])
     if options.get("transfer") is None:
         options["transfer"] = TransferFunction._of(transfer)
     options["association"] = "cell" if of_cells else "point"

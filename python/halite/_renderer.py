@@ -126,7 +126,8 @@ class Renderer:
         Parameters
         ----------
         scalars : str, or array of shape (n,) or (n, k), optional
-            An array of the mesh by name, or values of its points or cells, which are read where they are and copied once.
+            An array of the mesh by name, or values of its points or cells. They are read where they are, and what is drawn of them
+            is copied.
         association : {"point", "cell"}, optional
             Whether it belongs to points or cells. Values belong to points if there are as many.
         component, gradient_array
@@ -142,22 +143,23 @@ class Renderer:
         >>> renderer = halite.Renderer(halite.Mesh.image((2, 2, 2), point_data={"v": np.arange(8)}))
         >>> renderer.set_scalars(np.ones(8))
         """
-        if isinstance(component, str) and component != "all":
-            raise _halite.Error(f'component is a number or "all", and not "{component}"')
+        if isinstance(component, str) and component != "all" or isinstance(component, int) and component < 0:
+            raise _halite.Error(f'component is a number from 0 or "all", and not {component!r}')
         code = -1 if component is None else -2 if isinstance(component, str) else int(component)
-        second = gradient_array if gradient_array is None or isinstance(gradient_array, str) else native(gradient_array)
         if scalars is None or isinstance(scalars, str):
             name, of_cells = self.mesh._find(scalars, association)
-            components = next(n for k, of, n in self.mesh.arrays if k == name and (of == "cell") == of_cells)
-            self._core.set_field(self.mesh._core, name, of_cells, 0 if components == 1 and code == -1 else code, second)
-            part = component if isinstance(component, int) else None
-            self._range = self.mesh.range(name, "cell" if of_cells else "point", part)
+            values = self.mesh._numbers(name, of_cells)
         else:
-            values = native(scalars)
+            name, values = "values", native(scalars)
             of_cells = association == "cell" or (association is None and len(values) != self.mesh.n_points)
-            self._core.set_field(self.mesh._core, values, of_cells, 0 if values.ndim == 1 and code == -1 else code, second)
-            low, high = _range(values, component)
-            self._range = (low, high)
+        if gradient_array is None:
+            second = None
+        elif isinstance(gradient_array, str):
+            second = (gradient_array, self.mesh._numbers(gradient_array, of_cells))
+        else:
+            second = ("gradient_array", native(gradient_array))
+        low, high = self._core.set_field(self.mesh._core, (name, values), of_cells, code, second)
+        self._range = (low, high)
         self.set_transfer(self._transfer)
 
     def set_transfer(self, transfer: Optional[TransferFunction] = None) -> None:
@@ -244,12 +246,3 @@ class Renderer:
 
     def __reduce__(self) -> NoReturn:
         raise TypeError("a halite.Renderer cannot be pickled: it holds threads and device memory")
-
-
-def _range(values: npt.NDArray[Any], component: Component) -> tuple[float, float]:
-    """The least and the greatest finite value that is drawn."""
-    if values.ndim > 1:
-        values = values[:, component] if isinstance(component, int) else np.linalg.norm(values, axis=-1)
-    if values.size and not (np.isfinite(values.min()) and np.isfinite(values.max())):
-        values = values[np.isfinite(values)]
-    return (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)

@@ -2,7 +2,9 @@
 """Depths from windows of VTK, pictures into them, and exceptions out of them."""
 from __future__ import annotations
 
+import contextlib
 import sys
+from collections.abc import Iterator
 from typing import Any, Optional
 
 import numpy as np
@@ -49,13 +51,21 @@ class Frames:
     def render(self) -> None:
         """The window's Render, which raises what went wrong in its frame."""
         window: Any = self._window.Get()
+        with self.asked():
+            type(window).Render(window)
+
+    @contextlib.contextmanager
+    def asked(self) -> Iterator[None]:
+        """While a user's call draws frames: it raises what went wrong in the first of them that failed, at its end."""
         self._depth += 1
         try:
-            type(window).Render(window)
+            yield
         finally:
             self._depth -= 1
-        if not self._depth and self._error is not None:
-            error, self._error = self._error, None
+            error = self._error
+            if not self._depth:
+                self._error = None
+        if not self._depth and error is not None:
             raise error
 
     def failed(self, error: BaseException, is_new: bool) -> None:

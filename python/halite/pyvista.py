@@ -24,7 +24,8 @@ import pyvista
 from matplotlib.colors import ListedColormap
 from pyvista.plotting.colors import get_cmap_safe
 
-from . import Error, TransferFunction
+from . import Error, Mesh, TransferFunction
+from ._window import Frames
 from .vtk import Volume
 
 __all__ = ["add_volume"]
@@ -41,6 +42,8 @@ _REFUSED = {
     "multi_colors": "one grid is drawn at a time",
 }
 _EXPORTS = ("export_gltf", "export_html", "export_obj", "export_vrml", "export_vtksz", "export_wasm_html", "export_wazex")
+# Methods in which VTK asks for frames.
+_PICTURES = ("screenshot", "get_image_depth", "write_frame")
 
 
 def _bends(places: Any, values: Any, tolerance: float) -> list[int]:
@@ -77,12 +80,23 @@ def _warning(export: Callable[..., Any], warned: list[str]) -> Callable[..., Any
     return warn
 
 
+def _raising(plotter: Any, call: Callable[..., Any]) -> Callable[..., Any]:
+    """A method of a plotter in which VTK asks for frames, and which raises what went wrong in them."""
+    @functools.wraps(call)
+    def ask(*arguments: Any, **keywords: Any) -> Any:
+        if plotter.render_window is None:
+            return call(*arguments, **keywords)
+        with Frames.of(plotter.render_window).asked():
+            return call(*arguments, **keywords)
+    return ask
+
+
 def _refuse_ssao(*_: Any, **__: Any) -> None:
     raise Error("enable_ssao: PyVista's ambient occlusion does not know volumes of Halite")
 
 
 def _limit(plotter: Any) -> None:
-    """Has a plotter say what it cannot do with the volume."""
+    """Has a plotter say what it cannot do with the volume, and what went wrong."""
     if getattr(plotter.export_html, "__name__", "") == "export_html" and not hasattr(plotter.export_html, "__wrapped__"):
         warned: list[str] = []
         # What trame-pyvista adds to plotters, where it is installed, has exports of its own.
@@ -90,6 +104,8 @@ def _limit(plotter: Any) -> None:
             for name in _EXPORTS:
                 if hasattr(exporter, name):
                     setattr(exporter, name, _warning(getattr(exporter, name), warned))
+        for name in _PICTURES:
+            setattr(plotter, name, _raising(plotter, getattr(plotter, name)))
         plotter.enable_ssao = _refuse_ssao
 
 
@@ -190,8 +206,9 @@ def add_volume(plotter: pyvista.Plotter, volume: Any, scalars: Union[str, npt.Ar
         raise ValueError(f'blending is "composite" or "maximum", and not "{blending}"')
     if isinstance(volume, pyvista.MultiBlock):
         raise Error("a MultiBlock is several grids: add each of its blocks, or what its combine() makes of them")
-    if isinstance(volume, (str, os.PathLike)):
-        raise Error("a grid is meant, and not a path: pyvista.read(path) reads one")
+    if isinstance(volume, (str, os.PathLike, Mesh)):
+        what = "halite.Mesh" if isinstance(volume, Mesh) else "path"
+        raise Error(f"a grid of PyVista or VTK is meant, and not a {what}: pyvista.read(path) reads one")
     grid = pyvista.wrap(volume)
     if scalars is not None and not isinstance(scalars, str):
         given = np.asarray(scalars)

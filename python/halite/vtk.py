@@ -12,9 +12,9 @@ A volume whose own mapper draws nothing carries the bounds; when it is its turn,
 camera and the depths of that moment and composited. So opaque geometry may stand before, behind and inside.
 
 What it cannot do: translucent geometry goes under the volume; several volumes go over each other in the order in which they were
-added to the renderer; VTK's ambient occlusion (SSAO) is refused with an error; exporters leave the volume out; and windows have 8
-bits for each colour. What goes wrong in a frame is raised by the window's ``Render`` that asked for it; where VTK asked itself, while
-a user drags or for a tiled screenshot, it goes to ``sys.excepthook``, and the window lives on.
+added to the renderer; VTK's ambient occlusion (SSAO) is refused with an error; exporters leave the volume out, and say nothing; and
+windows have 8 bits for each colour. What goes wrong in a frame is raised by the window's ``Render`` that asked for it; where VTK asked
+itself, while a user drags or for a tiled screenshot, it goes to ``sys.excepthook``, and the window lives on.
 """
 from __future__ import annotations
 
@@ -133,6 +133,8 @@ class Volume(vtkVolume):
                  association: Optional[str] = None, component: Any = None, maximum: bool = False, coarse: int = 2, threads: int = 0,
                  device: str = "auto", engine: str = "auto", integral: Any = None, reconstruction: Optional[str] = None,
                  sampling: Optional[float] = None, gradient_array: Optional[str] = None) -> None:
+        if not hasattr(grid, "IsA"):
+            raise Error(f"a grid of VTK is meant, and not a {type(grid).__name__}: readers of VTK give one")
         _let_go()
         self.grid, self.scalars, self.association, self.component = grid, scalars, association, component
         self.maximum, self.coarse, self.frames = maximum, int(coarse), 0

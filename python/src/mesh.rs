@@ -2,20 +2,24 @@
 
 use crate::{Error, raised};
 use glam::{DMat3, DVec3};
+use halite::field::{Component, Number, magnitude};
 use halite::grid::{Grid, Lattice};
 use halite::io::{DataSet, Source, Time};
 use halite::memory;
-use halite::mesh::{Array, Arrays, Cells, Polyhedra, Values};
+use halite::mesh::cells::reads_array;
+use halite::mesh::{Array, Arrays, Cells, Polyhedra, check_length};
 use numpy::{Element, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use std::borrow::Cow;
 use std::path::PathBuf;
 
-/// A mesh, or a regular or rectilinear grid, with its arrays; it never changes.
+/// A mesh, or a regular or rectilinear grid; it never changes. One of a file has its arrays. Those of one that Python made stay with
+/// Python, but for what cells are split by.
 #[pyclass(module = "halite._halite", frozen)]
 pub(crate) struct Mesh(pub(crate) DataSet);
 
 /// A name, values of points or of cells.
-type Given<'py> = (String, Bound<'py, PyAny>);
+pub(crate) type Given<'py> = (String, Bound<'py, PyAny>);
 
 #[pymethods]
 impl Mesh {
@@ -34,7 +38,7 @@ impl Mesh {
         py.detach(read).map(Mesh).map_err(raised)
     }
 
-    /// Arrays are read where they are, and each is copied once, into the core's own form.
+    /// Points and cells are read where they are, and copied once, into the core's own form; arrays of values are checked.
     #[staticmethod]
     fn from_arrays(
         points: &Bound<'_, PyAny>,
@@ -50,8 +54,7 @@ impl Mesh {
             offsets: counts("offsets", offsets)?,
             connectivity: indices("cells", connectivity)?,
         };
-        let (of_points, of_cells) = (arrays(point_data)?, arrays(cell_data)?);
-        let mut mesh = halite::mesh::Mesh::new(triples(points)?, cells, of_points, of_cells).map_err(raised)?;
+        let mut mesh = halite::mesh::Mesh::new(triples(points)?, cells, vec![], vec![]).map_err(raised)?;
         if let Some([cells, faces, points]) = polyhedra {
             let polyhedra = Polyhedra {
                 cells: counts("faces of cells", &cells)?,
@@ -60,7 +63,7 @@ impl Mesh {
             };
             mesh.set_polyhedra(polyhedra).map_err(raised)?;
         }
-        Ok(Mesh(DataSet::Mesh(mesh)))
+        Mesh(DataSet::Mesh(mesh)).holding(point_data, cell_data)
     }
 
     #[staticmethod]
@@ -75,14 +78,14 @@ impl Mesh {
     ) -> PyResult<Self> {
         let direction = DMat3::from_cols_array_2d(&direction).transpose();
         let lattice = Lattice { origin: origin.into(), spacing: spacing.into(), direction, first, size };
-        let grid = Grid::regular(&lattice, arrays(point_data)?, arrays(cell_data)?).map_err(raised)?;
-        Ok(Mesh(DataSet::Grid(grid)))
+        let grid = Grid::regular(&lattice, vec![], vec![]).map_err(raised)?;
+        Mesh(DataSet::Grid(grid)).holding(point_data, cell_data)
     }
 
     #[staticmethod]
     fn rectilinear(axes: [Vec<f64>; 3], point_data: Vec<Given<'_>>, cell_data: Vec<Given<'_>>) -> PyResult<Self> {
-        let grid = Grid::rectilinear(axes, arrays(point_data)?, arrays(cell_data)?).map_err(raised)?;
-        Ok(Mesh(DataSet::Grid(grid)))
+        let grid = Grid::rectilinear(axes, vec![], vec![]).map_err(raised)?;
+        Mesh(DataSet::Grid(grid)).holding(point_data, cell_data)
     }
 
     #[getter]
@@ -146,6 +149,40 @@ impl Mesh {
 }
 
 impl Mesh {
+    /// Checks arrays of the mesh, and takes copies of those that it needs whatever is drawn.
+    fn holding(mut self, of_points: Vec<Given<'_>>, of_cells: Vec<Given<'_>>) -> PyResult<Self> {
+        for (all, is_cells) in [(of_points, false), (of_cells, true)] {
+            let count = if is_cells { self.n_cells() } else { self.n_points() };
+            for (name, given) in all {
+                let (components, length) = layout(&name, &given)?;
+                let kind = if is_cells { "cell" } else { "point" };
+                check_length(kind, &name, components, length, count).map_err(raised)?;
+                if reads_array(&name) {
+                    self.0 = with_array(self.0, array(name, &given)?, is_cells)?;
+                }
+            }
+        }
+        Ok(self)
+    }
+
+    /// The mesh itself, or, with copies of these arrays besides its own, one that shares its points and cells.
+    pub(crate) fn with_arrays(
+        &self,
+        of_points: Vec<Given<'_>>,
+        of_cells: Vec<Given<'_>>,
+    ) -> PyResult<Cow<'_, DataSet>> {
+        if of_points.is_empty() && of_cells.is_empty() {
+            return Ok(Cow::Borrowed(&self.0));
+        }
+        let mut all = self.0.clone();
+        for (arrays, is_cells) in [(of_points, false), (of_cells, true)] {
+            for (name, given) in arrays.into_iter().filter(|(name, _)| !reads_array(name)) {
+                all = with_array(all, array(name, &given)?, is_cells)?;
+            }
+        }
+        Ok(Cow::Owned(all))
+    }
+
     pub(crate) fn arrays(&self) -> &dyn Arrays {
         match &self.0 {
             DataSet::Mesh(mesh) => mesh,
@@ -232,25 +269,79 @@ where
     Err(Error::new_err(format!("{what} are no whole numbers of 8 to 64 bits")))
 }
 
-fn arrays(given: Vec<Given<'_>>) -> PyResult<Vec<Array>> {
-    given.into_iter().map(|(name, values)| array(name, &values)).collect()
+fn with_array(mut all: DataSet, array: Array, is_cells: bool) -> PyResult<DataSet> {
+    match (&mut all, is_cells) {
+        (DataSet::Mesh(mesh), false) => mesh.add_point_array(array),
+        (DataSet::Mesh(mesh), true) => mesh.add_cell_array(array),
+        (DataSet::Grid(grid), false) => grid.add_point_array(array),
+        (DataSet::Grid(grid), true) => grid.add_cell_array(array),
+    }
+    .map_err(raised)?;
+    Ok(all)
+}
+
+/// Runs `$body` with `$array` bound to the array of numpy `$given`, whatever its type, or fails.
+macro_rules! with_numbers {
+    ($name:expr, $given:expr, $array:ident => $body:expr) => {
+        with_numbers!(@ $name, $given, $array => $body; f64, f32, u8, i8, u16, i16, u32, i32, u64, i64)
+    };
+    (@ $name:expr, $given:expr, $array:ident => $body:expr; $($type:ty),*) => {
+        'found: {
+            $(if let Ok($array) = $given.cast::<PyArrayDyn<$type>>() {
+                let done = $body;
+                break 'found done;
+            })*
+            Err(Error::new_err(format!("the array \"{}\" is none of integers or floats of 8 to 64 bits", $name)))
+        }
+    };
+}
+
+/// The components and the numbers of an array of shape (n,) or (n, components).
+fn layout(name: &str, given: &Bound<'_, PyAny>) -> PyResult<(usize, usize)> {
+    with_numbers!(name, given, array => {
+        match array.shape().get(1..).map_or(1, |s| s.iter().product()) {
+            0 => Err(Error::new_err(format!("the array \"{name}\" has no components"))),
+            n => Ok((n, array.len())),
+        }
+    })
 }
 
 /// An array of shape (n,) or (n, components), in its own type of number.
-pub(crate) fn array(name: String, given: &Bound<'_, PyAny>) -> PyResult<Array> {
-    macro_rules! of {
-        ($($type:ty => $variant:ident),*) => {
-            $(if let Ok(array) = given.cast::<PyArrayDyn<$type>>() {
-                let components = array.shape().get(1..).map_or(1, |s| s.iter().product());
-                if components == 0 {
-                    return Err(Error::new_err(format!("the array \"{name}\" has no components")));
-                }
-                let values = array.try_readonly()?;
-                let values = memory::copied(format!("the array \"{name}\""), values.as_slice()?).map_err(raised)?;
-                return Ok(Array { name, components, values: Values::$variant(values) });
-            })*
-        };
-    }
-    of!(f64 => F64, f32 => F32, u8 => U8, i8 => I8, u16 => U16, i16 => I16, u32 => U32, i32 => I32, u64 => U64, i64 => I64);
-    Err(Error::new_err(format!("the array \"{name}\" is none of integers or floats of 8 to 64 bits")))
+fn array(name: String, given: &Bound<'_, PyAny>) -> PyResult<Array> {
+    let (components, _) = layout(&name, given)?;
+    with_numbers!(name, given, array => {
+        let values = memory::copied(format!("the array \"{name}\""), array.try_readonly()?.as_slice()?);
+        Ok(Array { name, components, values: Number::values(values.map_err(raised)?) })
+    })
+}
+
+/// What is drawn of such an array, and no more of it: the only copy that is made; and which component of that it is.
+pub(crate) fn drawn(name: String, given: &Bound<'_, PyAny>, component: Component) -> PyResult<(Array, Component)> {
+    let (n, _) = layout(&name, given)?;
+    let component = if component == Component::Magnitude && n == 1 { Component::Index(0) } else { component };
+    let what = || format!("what is drawn of the array \"{name}\"");
+    let values = match component {
+        Component::Index(k) if k < n && n > 1 => with_numbers!(name, given, array => {
+            picked(what(), &array.try_readonly()?, n, |tuple| tuple[k]).map(Number::values)
+        }),
+        Component::Magnitude => with_numbers!(name, given, array => {
+            picked(what(), &array.try_readonly()?, n, magnitude).map(Number::values)
+        }),
+        _ => return Ok((array(name, given)?, component)),
+    };
+    values.map(|values| (Array { name, components: 1, values }, Component::Index(0)))
+}
+
+/// One number of each tuple of `n`.
+fn picked<T: Element, U>(
+    what: String,
+    array: &PyReadonlyArrayDyn<'_, T>,
+    n: usize,
+    of: impl Fn(&[T]) -> U,
+) -> PyResult<Vec<U>> {
+    let numbers = array.as_slice()?;
+    let mut all = vec![];
+    memory::reserve(what, &mut all, numbers.len() / n).map_err(raised)?;
+    all.extend(numbers.chunks_exact(n).map(of));
+    Ok(all)
 }

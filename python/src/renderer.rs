@@ -1,6 +1,6 @@
 //! The renderer, and what is drawn when nobody says.
 
-use crate::mesh::{Mesh, array};
+use crate::mesh::{Given, Mesh, drawn};
 use crate::transfer::TransferFunction;
 use crate::view::{View, matrix};
 use crate::{Error, raised};
@@ -8,6 +8,7 @@ use halite::field::{Association, Component, Field};
 use halite::host::{Log, Session};
 use halite::image::{Backdrop, Image};
 use halite::io::DataSet;
+use halite::mesh::Array;
 use halite::mesh::cells::Tetrahedra;
 use halite::project::Switches;
 use halite::scene::{self, Scalars};
@@ -64,6 +65,34 @@ fn component(code: i64) -> Component {
     }
 }
 
+/// The name of an array, and its numbers if it is not the mesh's own.
+type Named<'py> = (String, Option<Bound<'py, PyAny>>);
+
+/// What a field is made of.
+enum Source<'a> {
+    Own(&'a Array, Component),
+    /// What is drawn of an array of Python.
+    Copy(Array, Component),
+}
+
+impl<'a> Source<'a> {
+    fn new(mesh: &'a Mesh, (name, given): Named<'_>, of_cells: bool, part: Component) -> PyResult<Self> {
+        let Some(given) = given else {
+            let array = mesh.array(&name, of_cells)?;
+            let is_one = part == Component::Magnitude && array.components == 1;
+            return Ok(Source::Own(array, if is_one { Component::Index(0) } else { part }));
+        };
+        drawn(name, &given, part).map(|(array, part)| Source::Copy(array, part))
+    }
+
+    fn field(self, association: Association) -> halite::Result<Field> {
+        match self {
+            Source::Own(array, part) => Field::from_array(array, association, part),
+            Source::Copy(array, part) => Field::taking(array, association, part),
+        }
+    }
+}
+
 #[pymethods]
 impl Renderer {
     #[new]
@@ -81,41 +110,34 @@ impl Renderer {
         })
     }
 
-    /// Draws an array of the mesh by its name, or values; with a second variable, likewise.
+    /// Draws an array, by its name that of the mesh itself; with a second variable, likewise. Returns the range of what is drawn; of
+    /// several components, of the last, which the opacity depends on.
     fn set_field(
         &self,
         py: Python<'_>,
         mesh: &Mesh,
-        values: &Bound<'_, PyAny>,
+        values: Named<'_>,
         of_cells: bool,
         code: i64,
-        second: Option<Bound<'_, PyAny>>,
-    ) -> PyResult<()> {
-        let (own, other);
-        let first = match values.extract::<String>() {
-            Ok(name) => mesh.array(&name, of_cells)?,
-            Err(_) => {
-                own = array("values".into(), values)?;
-                &own
+        second: Option<Named<'_>>,
+    ) -> PyResult<[f64; 2]> {
+        let first = Source::new(mesh, values, of_cells, component(code))?;
+        let second = second.map(|second| Source::new(mesh, second, of_cells, Component::Magnitude)).transpose()?;
+        let field = || {
+            let field = first.field(association(of_cells))?;
+            match second {
+                Some(second) => field.with_second(second.field(association(of_cells))?),
+                None => Ok(field),
             }
         };
-        let second = match &second {
-            None => None,
-            Some(second) => match second.extract::<String>() {
-                Ok(name) => Some(mesh.array(&name, of_cells)?),
-                Err(_) => {
-                    other = array("gradient_array".into(), second)?;
-                    Some(&other)
-                }
-            },
+        let mut range = [0.0; 2];
+        let measured = || {
+            let field = field()?;
+            range = field.range(field.kind().components() - 1);
+            Ok(field)
         };
-        let field = || {
-            let field = Field::from_array(first, association(of_cells), component(code))?;
-            let Some(second) = second else { return Ok(field) };
-            let part = if second.components == 1 { Component::Index(0) } else { Component::Magnitude };
-            field.with_second(Field::from_array(second, association(of_cells), part)?)
-        };
-        self.with(py, |session| session.set_field(field))
+        self.with(py, |session| session.set_field(measured))?;
+        Ok(range)
     }
 
     /// How rays are integrated, how grids are rebuilt along them, and the projection's switches; the first and the last are texts
@@ -207,17 +229,20 @@ impl Renderer {
 /// So many points of a grid are looked at to choose colours and a view.
 const MOST_SAMPLES: usize = 1 << 16;
 
-/// The array, the view and the transfer function that show something of a mesh.
+/// The array, the view and the transfer function that show something of a mesh with these arrays.
 #[pyfunction]
 pub(crate) fn automatic(
     py: Python<'_>,
     mesh: &Mesh,
+    point_data: Vec<Given<'_>>,
+    cell_data: Vec<Given<'_>>,
     name: Option<(String, bool)>,
     size: [u32; 2],
 ) -> PyResult<(String, bool, View, TransferFunction)> {
+    let all = mesh.with_arrays(point_data, cell_data)?;
     let chosen = py.detach(|| {
         let own;
-        let mesh = match &mesh.0 {
+        let mesh = match &*all {
             DataSet::Mesh(mesh) => mesh,
             DataSet::Grid(grid) => {
                 own = grid.coarse(MOST_SAMPLES)?.into_mesh()?;

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import halite
-from conftest import chord, lattice, look_at, perspective, resident, tetrahedron
+from conftest import chord, grown, lattice, look_at, perspective, resident, tetrahedron
 
 
 def test_pictures_are_the_integral(box, fog):
@@ -163,10 +163,76 @@ def test_arrays_are_copied_once(floats, ints):
     finally:
         tracemalloc.stop()
     assert max(of_mesh, of_values) < 20_000 < arrays[0].nbytes <= of_columns
-    # The copy is the mesh's own.
+    # Points and cells are the mesh's own.
     before = mesh.bounds
     arrays[0][:] = 7
     assert mesh.bounds == before
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is read from /proc")
+def test_what_is_not_drawn_is_not_copied():
+    """A mesh takes memory for points and cells, whatever arrays it has, and a renderer for the component that it draws."""
+    points, cells, offsets, types = lattice(60)
+    vectors = {f"v{i}": np.random.default_rng(i).random((len(points), 3)) for i in range(8)}
+    arrays = (points, cells.astype(np.int32), offsets, types.astype(np.uint8))
+    of_mesh = points.nbytes + arrays[1].nbytes + offsets.nbytes + types.nbytes
+    make = lambda: halite.Mesh.from_arrays(*arrays, point_data=vectors)
+    renderer = halite.Renderer(make(), "v0", component=0)
+    mesh, most = grown(make)
+    # Threads and what allocators keep are in it.
+    slack = 4 << 20
+    assert most < of_mesh + slack < 8 * points.nbytes, (most, of_mesh)
+    renderer.set_mesh(mesh, "v0", component=0)
+    for part, copy in ((1, points.nbytes / 3), (None, points.nbytes / 3)):
+        _, most = grown(lambda: renderer.set_scalars("v7", component=part))
+        assert most < copy + slack, (part, most, copy)
+    drawn, most = grown(lambda: renderer.set_scalars(vectors["v3"], component=2))
+    assert most < points.nbytes / 3 + slack
+
+
+def test_arrays_are_followed_when_they_are_set(fog):
+    """Values that a program writes show from the next time on that they are set; until then the picture stays."""
+    points, cells, offsets, types = lattice()
+    values, wide = np.ones(27), np.ones((27, 4), np.float32)
+    mesh = halite.Mesh.from_arrays(points, cells, offsets, types, point_data={"s": values, "t": wide[:, 2]})
+    view = halite.View((3, -2.5, 2), view_up=(0, 0, 1), size=(40, 40))
+    transfer = halite.TransferFunction([(0, 1, 1, 1)], opacity=[(0, 0), (1, 1)])
+    for name, array in (("s", values), ("t", wide)):
+        renderer = halite.Renderer(mesh, name, transfer=transfer)
+        before = renderer.render(view)
+        array[...] = 0.25
+        assert mesh.range(name) == (0.25, 0.25)
+        assert (renderer.render(view) == before).all()
+        renderer.set_scalars(name)
+        less = renderer.render(view)
+        assert 0 < less.max() < before.max() and (less == halite.Renderer(mesh, name, transfer=transfer).render(view)).all()
+    # Components by number, by length and all of them are those of values that are given.
+    colors = np.random.default_rng(1).random((27, 4))
+    mesh = halite.Mesh.from_arrays(points, cells, offsets, types, point_data={"c": colors, "one": colors[:, :1] - 0.5})
+    for part, same in ((2, colors[:, 2]), (None, np.sqrt((colors ** 2).sum(1)))):
+        pictures = [halite.Renderer(mesh, "c", component=part, transfer=transfer).render(view),
+                    halite.Renderer(mesh, same, transfer=transfer).render(view)]
+        assert np.abs(pictures[0] - pictures[1]).max() < 1e-6 and pictures[0].max() > 0.1
+    assert halite.Renderer(mesh, "c", component="all", transfer=transfer).render(view)[..., :3].std(-1).max() > 0.01
+    assert (halite.Renderer(mesh, "one", transfer=transfer).render(view)
+            == halite.Renderer(mesh, colors[:, 0] - 0.5, transfer=transfer).render(view)).all()
+    with pytest.raises(halite.Error, match="4 components, so there is no component 4"):
+        halite.Renderer(mesh, "c", component=4)
+    for bad in (-3, "some"):
+        with pytest.raises(halite.Error, match="component is"):
+            halite.Renderer(mesh, "c", component=bad)
+
+
+def test_ghosts_are_left_out(fog):
+    """What marks cells is the mesh's own, whatever is drawn."""
+    points, cells, offsets, types = lattice()
+    marks = np.zeros(8, np.uint8)
+    marks[points[cells.reshape(8, 8)].mean(1)[:, 0] > 0] = 1
+    mesh = halite.Mesh.from_arrays(points, cells, offsets, types, point_data={"s": np.ones(27)}, cell_data={"vtkGhostType": marks})
+    view = halite.View((0, -9, 0), view_up=(0, 0, 1), parallel_scale=1.5, size=(30, 30))
+    half = halite.Renderer(mesh, "s", transfer=fog).render(view)
+    assert half[15, 6:14, 3].min() > 0.5 and half[15, 16:, 3].max() == 0
+    assert halite.show(mesh, size=(40, 30)).pixels[..., 3].max() > 0
 
 
 def test_any_layout_and_type_is_taken():

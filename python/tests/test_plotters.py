@@ -152,6 +152,12 @@ def test_errors_are_raised_and_the_plotter_lives_on(monkeypatch):
     volume.scalars = "other"
     p.render_window.GetInteractor().Render()
     assert len(shown) == 1 and '"other"' in str(shown[0])
+    # Where VTK asks for frames in what the user calls, for tiles too, that raises it.
+    for ask in (lambda: p.screenshot(scale=2), p.get_image_depth):
+        volume.scalars = f"no {ask}"
+        with pytest.raises(halite.Error, match='"no ') as raised:
+            ask()
+        assert str(volume.error) == str(raised.value) and len(shown) == 1
     volume.scalars = "s"
     volume.grid.GetPointData().GetArray("s").Modified()
     p.render()
@@ -244,9 +250,12 @@ def test_what_users_of_pyvista_give():
     green = shot(q)
     assert green[HEIGHT // 2, WIDTH // 2, 1] > 250 and green[..., [0, 2]].max() == 0 and not len(q.scalar_bars)
     q.close()
-    for wrong, word in ((pyvista.MultiBlock([grid_of()]), "combine"), ("grid.vtu", "pyvista.read"), (pyvista.Sphere(), "vtkPolyData")):
+    for wrong, word in ((pyvista.MultiBlock([grid_of()]), "combine"), ("grid.vtu", "pyvista.read"), (pyvista.Sphere(), "vtkPolyData"),
+                        (halite.Mesh.from_vtk(grid_of()), "halite.Mesh")):
         with pytest.raises(halite.Error, match=word):
             halite.pyvista.add_volume(p, wrong)
+    with pytest.raises(halite.Error, match="grid of VTK is meant, and not a Mesh"):
+        halite.vtk.Volume(halite.Mesh.from_vtk(grid_of()))
     # A picture by the plotter's camera is what the plotter shows.
     look(p)
     p.show(auto_close=False)

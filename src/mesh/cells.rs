@@ -33,6 +33,12 @@ use std::ops::Range;
 /// The most tetrahedra that can be indexed: a face is numbered by four times its tetrahedron plus its corner.
 pub const MAX_TETRAHEDRA: usize = (1 << 30) - 1;
 
+/// Whether an array of this name tells how cells are split, or which are left out: a mesh or grid needs it whatever is drawn.
+pub fn reads_array(name: &str) -> bool {
+    use {ghosts::GHOST_ARRAY, ghosts::GHOST_LEVELS_ARRAY, splitter::DEGREES_ARRAY, splitter::WEIGHTS_ARRAY};
+    [GHOST_ARRAY, GHOST_LEVELS_ARRAY, DEGREES_ARRAY, WEIGHTS_ARRAY].contains(&name)
+}
+
 /// Cells that one task splits.
 const CHUNK: usize = 1 << 14;
 

@@ -91,8 +91,8 @@ pub fn unwelded(mesh: &Mesh) -> Mesh {
         Array { name: a.name.clone(), components: a.components, values }
     });
     Mesh {
-        points: from.iter().map(|&p| mesh.points[p as usize]).collect(),
-        cells: own,
+        points: from.iter().map(|&p| mesh.points[p as usize]).collect::<Vec<_>>().into(),
+        cells: own.into(),
         polyhedra: None,
         point_arrays: arrays.collect(),
         cell_arrays: mesh.cell_arrays().to_vec(),
@@ -267,8 +267,8 @@ impl Builder {
         let s = array("s", self.points.iter().map(|&p| field(p)).collect());
         let c = array("c", (0..cells.len()).map(at_centre).collect());
         Mesh {
-            points: self.points,
-            cells,
+            points: self.points.into(),
+            cells: cells.into(),
             polyhedra: None,
             point_arrays: vec![s],
             cell_arrays: vec![c],

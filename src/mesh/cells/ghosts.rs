@@ -3,9 +3,9 @@
 use crate::mesh::Array;
 
 /// The name of VTK's array that marks ghosts, and its bits (`vtkDataSetAttributes.h`).
-const GHOST_ARRAY: &str = "vtkGhostType";
+pub(super) const GHOST_ARRAY: &str = "vtkGhostType";
 /// Its forerunner (before VTK 6.3): more than 0 for ghosts.
-const GHOST_LEVELS_ARRAY: &str = "vtkGhostLevels";
+pub(super) const GHOST_LEVELS_ARRAY: &str = "vtkGhostLevels";
 /// DUPLICATECELL | REFINEDCELL | HIDDENCELL.
 const GHOST_CELL: u8 = 1 | 8 | 32;
 /// HIDDENPOINT.

@@ -13,8 +13,8 @@ use std::ops::Range;
 
 /// The cell array that tells the degrees of Lagrange and Bézier cells, and the point array that makes the latter
 /// rational.
-const DEGREES_ARRAY: &str = "HigherOrderDegrees";
-const WEIGHTS_ARRAY: &str = "RationalWeights";
+pub(super) const DEGREES_ARRAY: &str = "HigherOrderDegrees";
+pub(super) const WEIGHTS_ARRAY: &str = "RationalWeights";
 
 /// What happens to a cell.
 enum Fate<'a> {
