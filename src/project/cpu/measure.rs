@@ -127,9 +127,9 @@ impl<const N: usize> Canvas<N> {
             };
             let at = self.found.place(i);
             let transmittance = load(window(&self.light[3], at));
-            for k in 0..3 {
-                let light = window_mut(&mut self.light[k], at);
-                transmittance.mul_add(color[k], load(light)).store_array(light);
+            for (light, &color) in self.light.iter_mut().zip(&color) {
+                let light = window_mut(light, at);
+                transmittance.mul_add(color, load(light)).store_array(light);
             }
             (-transmittance).mul_add(alpha, transmittance).store_array(window_mut(&mut self.light[3], at));
             if r.dark < f32::INFINITY {
@@ -185,8 +185,8 @@ impl<const N: usize> Canvas<N> {
             for (l, part) in parts.iter().enumerate() {
                 let pixel = part.pixel % PIXELS;
                 let transmittance = self.light[3][pixel];
-                for k in 0..4 {
-                    self.light[k][pixel] += transmittance * lit[k][l];
+                for (light, lit) in self.light.iter_mut().zip(&lit) {
+                    light[pixel] += transmittance * lit[l];
                 }
             }
         }
