@@ -2,7 +2,7 @@
 //! the meshes of 1.3 million cells alone, with `large` those of 10 million, with `threads=N` on N threads.
 //!
 //! Convex meshes, and any by shared faces alone, need no edges of the boundary; those with holes and parts need them. The device draws
-//! its cells in this order; what a frame takes besides is told by `halite bench --engine project --views 8`, as `order_ms` in its JSON.
+//! its cells in this order; what a frame takes besides is reported by `halite bench --engine project --views 8`: `order_ms` in its JSON.
 
 #![allow(
     clippy::expect_used,
@@ -17,7 +17,7 @@ use halite::order::mpvo::{Mpvo, Rule};
 use halite::view::{Camera, Projection, View};
 use std::time::Instant;
 
-/// Views, all around, of which the median and the longest time are told.
+/// Views, all around, of which the median and the longest time are printed.
 const VIEWS: u32 = 9;
 
 /// Points along each axis of the convex meshes and of those with holes, of about 1.3 and 10 million cells.

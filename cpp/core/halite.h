@@ -392,7 +392,7 @@ struct Statistics
 struct Integral
 {
   /// "exact"; "volume", "polynomial" or "cylindrical": a pre-integrated table; or "auto": exact, or a table where
-  /// functions have so many knots that it is faster. Of fields of several components, a table tells how much the colours at both
+  /// functions have so many knots that it is faster. Of fields of several components, a table holds how much the colours at both
   /// ends of a segment count; regular and rectilinear grids have tables of one component alone. For such grids that
   /// are rebuilt by parabolas there are "second-order", a table of slabs of one length, and "second-order-polynomial", of all.
   std::string form;

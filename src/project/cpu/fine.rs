@@ -1,4 +1,5 @@
-//! Fine: the pixels of a cell, 4 × 4 at a time: found, checked, and [measured](super::measure).
+//! Fine: the pixels of a tile. Blocks of 4 × 4 of them are kept cell by cell, then [found](super::find) inside the cells, checked, and
+//! [measured](super::measure).
 //!
 //! A pixel keeps the key where its last cell ended. The next one must begin there, or a gap must lie between the two where the ray
 //! is outside the mesh, by its crossings of the boundary; at the end nothing of the mesh may be left. A pixel of which that is not
