@@ -27,13 +27,13 @@ pub use batch::Batch;
 pub use choice::{Choice, Form};
 pub(crate) use knots::BUCKETS;
 pub use knots::Knots;
-pub(crate) use knots::Line;
+pub(crate) use knots::{Line, MOST_OF_PART};
 pub use lookup::{Integral, Lookup};
 
 use crate::field::{Kind, Normal};
 use crate::real::Real;
-use crate::transfer::{Emission, TransferFunction};
-use knots::{BRIGHTEST, Side, Track, compile, extinction, sample};
+use crate::transfer::{Convention, Emission, TransferFunction};
+use knots::{BRIGHTEST, Curved, Side, Track, chord, compile, extinction, part, sample};
 
 /// Extinction that stands for "opaque", per normalised unit of length: even the thinnest slab that f32 can tell from
 /// nothing is then opaque, and its square is still finite.
@@ -202,6 +202,8 @@ pub struct Exact<R> {
     pub(crate) kind: Kind,
     /// Extinction over the last component; for a scalar field with the colour in the other channels.
     pub(crate) opacity: Knots<R>,
+    /// The same as it is, where `opacity` has chords of a logarithm.
+    pub(crate) curved: Option<Curved<R>>,
     /// Colour over the first component of a [`Kind::Pair`].
     pub(crate) color: Option<Knots<R>>,
     /// The components of an RGBA field times this are the colour.
@@ -223,23 +225,27 @@ impl<R: Real> Exact<R> {
         let colored = |s: f64, side: Side| {
             sample(transfer.color(), transfer.clamp(), s, side).map(|c| (c * emission).min(BRIGHTEST))
         };
-        let extinction = extinction(transfer, OPAQUE_EXTINCTION * scale);
-        let mut places: Vec<f64> = extinction.iter().map(|k| k.0).collect();
-        if kind == Kind::Scalar {
-            places.extend(transfer.color().iter().map(|k| k.0));
-        }
-        let opacity = compile(places, last, |s, side| {
-            let [tau] = sample(&extinction, transfer.clamp(), s, side);
-            let [r, g, b] = if kind == Kind::Scalar { colored(s, side) } else { [0.0; 3] };
-            [tau / scale, r, g, b]
-        });
+        let colors = if kind == Kind::Scalar { transfer.color() } else { &[] };
+        let colors: Vec<f64> = colors.iter().map(|k| k.0).collect();
+        let function = |step: fn(f64) -> f64, also: &[f64]| {
+            let extinction = extinction(transfer, OPAQUE_EXTINCTION * scale, step, also);
+            let places = extinction.iter().map(|k| k.0).chain(colors.iter().copied()).collect();
+            compile(places, last, |s, side| {
+                let [tau] = sample(&extinction, transfer.clamp(), s, side);
+                let [r, g, b] = if kind == Kind::Scalar { colored(s, side) } else { [0.0; 3] };
+                [tau / scale, r, g, b]
+            })
+        };
+        let opacity = function(chord, &[]);
+        let curved = (transfer.convention() == Convention::Opacity)
+            .then(|| Curved { knots: function(part, &colors), unit: R::of(transfer.unit_distance() * scale) });
         let color = (kind == Kind::Pair).then(|| {
             compile(transfer.color().iter().map(|k| k.0).collect(), normal[0], |s, side| {
                 let [r, g, b] = colored(s, side);
                 [0.0, r, g, b]
             })
         });
-        Exact { kind, opacity, color, scale: R::of(emission), direct }
+        Exact { kind, opacity, curved, color, scale: R::of(emission), direct }
     }
 
     /// What a table is of: this function, if it is of one component; else one whose "colours", those of an RGBA field, are the
@@ -251,6 +257,7 @@ impl<R: Real> Exact<R> {
         (self.kind != Kind::Scalar).then(|| Exact {
             kind: Kind::Rgba,
             opacity: self.opacity.clone(),
+            curved: None,
             color: None,
             scale: R::of(1.0),
             direct: self.direct,

@@ -369,11 +369,23 @@ pub(super) fn compile<R: Real>(
 
 /// Extinction per world unit of length as a piecewise linear function of the field, by the transfer function's
 /// convention; `opaque` on every stretch where opacity is 1 or more. A value that reaches 1 alone lets light through:
-/// the logarithm's integral is finite there.
-pub(super) fn extinction(transfer: &TransferFunction, opaque: f64) -> Vec<(f64, [f64; 1])> {
-    let knots = transfer.opacity();
+/// the logarithm's integral is finite there. Between its knots a logarithm has more, where opacity, on its way up, has risen by
+/// `step`, and at the values `also`.
+pub(super) fn extinction(
+    transfer: &TransferFunction,
+    opaque: f64,
+    step: fn(f64) -> f64,
+    also: &[f64],
+) -> Vec<(f64, [f64; 1])> {
+    let mut knots = transfer.opacity().to_vec();
     if transfer.convention() == Convention::Extinction {
         return knots.iter().map(|&(s, a)| (s, [transfer.extinction(a).min(opaque)])).collect();
+    }
+    for &s in also {
+        let at = knots.partition_point(|k| k.0 < s);
+        if at > 0 && knots.get(at).is_some_and(|k| k.0 > s) {
+            knots.insert(at, (s, transfer.opacity_at(s)));
+        }
     }
     // On its way to 1: what lies beyond `OPAQUE` has no length that f32 could tell. Where the unit distance is tiny, all that
     // is not transparent is opaque.
@@ -390,7 +402,7 @@ pub(super) fn extinction(transfer: &TransferFunction, opaque: f64) -> Vec<(f64, 
         if a0 >= OPAQUE {
             curve.push((s0, [opaque]));
         }
-        let mut rise: Vec<_> = std::iter::successors(Some(low), |&a| Some(a + chord(a)))
+        let mut rise: Vec<_> = std::iter::successors(Some(low), |&a| Some(a + step(a)))
             .take_while(|&a| a < high.min(OPAQUE))
             .chain([high.min(OPAQUE)])
             .map(|a| (place(a), tau(a)))
@@ -419,8 +431,25 @@ pub(super) fn extinction(transfer: &TransferFunction, opaque: f64) -> Vec<(f64, 
 }
 
 /// How far opacity may rise from `a` before the chord of −ln(1 − a) is off by 1e-5 of it.
-fn chord(a: f64) -> f64 {
+pub(super) fn chord(a: f64) -> f64 {
     (0.9 * (8e-5 * -(-a).ln_1p()).sqrt() * (1.0 - a)).max(1.8e-5 * (1.0 - a))
+}
+
+/// How far opacity may rise from `a` on one part of a [`Curved`] function.
+pub(super) fn part(a: f64) -> f64 {
+    MOST_OF_PART * (1.0 - a)
+}
+
+/// The share of what is not opaque at the beginning of a part that is opaque at its end.
+pub(crate) const MOST_OF_PART: f64 = 0.4;
+
+/// A function under [`Convention::Opacity`]: between its knots (1 − a) is linear, of which extinction is the logarithm, and
+/// falls to 1 − [`MOST_OF_PART`] of itself at most, but where it becomes opaque.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Curved<R> {
+    pub(crate) knots: Knots<R>,
+    /// The unit distance, normalised.
+    pub(crate) unit: R,
 }
 
 #[cfg(test)]
@@ -432,7 +461,7 @@ mod tests {
         let color = vec![(0.0, [1.0; 3])];
         let opacity = vec![(-1.0, 0.0), (0.0, 0.7), (0.5, 0.2), (0.9, 0.999)];
         let transfer = TransferFunction::new(color, opacity, 0.3).unwrap().with_convention(Convention::Opacity);
-        let curve = extinction(&transfer, 1e15);
+        let curve = extinction(&transfer, 1e15, chord, &[]);
         for i in 0..100_000 {
             let s = -1.0 + 1.9 * (f64::from(i) + 0.37) / 1e5;
             let (got, want) = (sample(&curve, true, s, Side::Above)[0], transfer.extinction(transfer.opacity_at(s)));

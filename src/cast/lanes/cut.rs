@@ -9,7 +9,7 @@ use super::lines::{FLAT, Line};
 use super::walk::LANES;
 use crate::integral::Light;
 use crate::integral::cubic::Cubic;
-use crate::integral::cubic::stretch::{Stretch, part, shallow};
+use crate::integral::cubic::stretch::Stretch;
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x8, mask32x8};
 
@@ -189,7 +189,7 @@ impl Cut {
             let rows = line.map(|i| scene.lines.all[i]);
             let value = column(simd, rows.map(|r: Line| r.value));
             let slope = column(simd, rows.map(|r: Line| r.slope));
-            let [low, high, start, _] = column(simd, rows.map(|r: Line| [r.low, r.high, r.start, 0.0]));
+            let [low, high, start, curve] = column(simd, rows.map(|r: Line| [r.low, r.high, r.start, r.curve]));
             let knot = rises.select(high, low);
             let crosses = on & ((rises & last.simd_gt(high)) | (!rises & last.simd_lt(low)));
             let to = if crosses.to_bitmask() == 0 {
@@ -197,10 +197,11 @@ impl Cut {
             } else {
                 crosses.select(root(simd, &a, [u, s, last], knot, rises, crosses), one)
             };
-            let (h, cut) = shallow(simd, &a, [u, to - u, s - start], length, [value[0], slope[0]], on);
-            let (rise, _) = part(simd, &a, u, h);
-            let stretch = Stretch { offset: s - start, rise, length: length * h, value, slope };
-            let light = stretch.integrate(simd, scene.frame.exact.direct);
+            let are_curved = scene.lines.are_curved;
+            let whole = Stretch { offset: s - start, rise: [a[1], a[2], a[3]], length, value, slope, curve };
+            let (h, cut) = whole.shallow(simd, u, to - u, on, are_curved);
+            let (part, direct) = (whole.part(simd, u, h), scene.frame.exact.direct);
+            let light = if are_curved { part.integrate_logarithm(simd, direct) } else { part.integrate(simd, direct) };
             // What has no length that f32 could tell, and yet is deep, shows what it begins with.
             let behind = if cut == 0 { to } else { mask32x8::from_bitmask(simd, cut).select(u + h, to) };
             let stuck = on & mask32x8::from_bitmask(simd, cut) & behind.simd_le(u);

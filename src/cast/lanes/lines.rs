@@ -1,7 +1,7 @@
 //! The transfer function as lanes read it: lines in f32, over values that are counted in the spread of its knots.
 
 use crate::field::Normal;
-use crate::integral::Exact;
+use crate::integral::{Exact, OPAQUE_EXTINCTION};
 
 /// A line narrower than this, in half the spread of the knots, or steeper, in the greatest values per that, leaves f32 too
 /// few digits: extinction, and colours.
@@ -42,7 +42,9 @@ pub(super) struct Line {
     pub(super) shows: f32,
     /// Between these a value is on it whatever f32 is off by; nowhere if that is too much.
     pub(super) inner: [f32; 2],
-    rest: [f32; 2],
+    /// What `Stretch::curve` is; 0 where extinction is linear.
+    pub(super) curve: f32,
+    rest: f32,
 }
 
 /// All of them, ascending.
@@ -50,6 +52,8 @@ pub(super) struct Line {
 pub(super) struct Lines {
     pub(super) map: Map,
     pub(super) all: Vec<Line>,
+    /// Whether extinction is the logarithm of a line.
+    pub(super) are_curved: bool,
     /// The line that each of [`BUCKETS`] parts of [−1, 1] begins in.
     bucket: Vec<u32>,
     /// Of lines before each: how many show, how many are too narrow for f32, and, counted with what ends there, steps.
@@ -62,7 +66,7 @@ impl Lines {
     /// Those of a scalar's function over values that `normal` maps; their map is in f32's reach, if the values are
     /// `exact_in_f32`. Nothing if f32 cannot hold the function.
     pub(super) fn new(exact: &Exact<f64>, normal: Normal, exact_in_f32: bool) -> Option<Self> {
-        let knots = &exact.opacity;
+        let (knots, curved) = exact.curved.as_ref().map_or((&exact.opacity, None), |c| (&c.knots, Some(c.unit)));
         let n = knots.s.len();
         // The outer knots lie beyond every value.
         let inner = &knots.s[1..n - 1];
@@ -84,6 +88,7 @@ impl Lines {
         let mut lines = Lines {
             map: Map { mid, factor },
             all: vec![],
+            are_curved: curved.is_some(),
             bucket: vec![],
             shown: vec![0],
             narrow: vec![0],
@@ -96,11 +101,25 @@ impl Lines {
         for i in (0..n - 1).filter(|&i| knots.s[i] < knots.s[i + 1]) {
             let [from, to] = [place(knots.s[i]), place(knots.s[i + 1])];
             let (first, last) = (i == 0, i + 2 == n);
-            let slope = if first || last {
+            let mut slope = if first || last {
                 [0.0; 4]
             } else {
                 [0, 1, 2, 3].map(|k| (knots.value[i + 1][k] - knots.value[i][k]) / (to - from))
             };
+            let (mut value, mut start) = (knots.value[i], if first { if last { 0.0 } else { to } } else { from });
+            let (mut curve, mut steepest) = (0.0, slope);
+            let depths = [i, i + 1].map(|i| knots.value[i][0]);
+            if let Some(unit) = curved.filter(|_| slope[0] != 0.0 && depths[0].max(depths[1]) < OPAQUE_EXTINCTION) {
+                // From where more of it passes: there the logarithm's series begins.
+                let passes = depths.map(|depth| (-depth * unit).exp());
+                let [most, least] = [passes[0].max(passes[1]), passes[0].min(passes[1])];
+                if passes[1] > passes[0] {
+                    (value, start) = (knots.value[i + 1], to);
+                }
+                curve = (passes[0] - passes[1]) / (to - from) / most;
+                slope[0] = curve / unit;
+                steepest[0] = slope[0] * (most / least);
+            }
             if !knots.value[i].iter().all(|v| v.abs() <= GREATEST) {
                 return None;
             }
@@ -109,19 +128,19 @@ impl Lines {
             let low = if first { f32::NEG_INFINITY } else { from as f32 };
             let high = if last { f32::INFINITY } else { to as f32 };
             let seen = shows(&knots.value[i]) || shows(&knots.value[i + 1]);
-            let start = if first { if last { 0.0 } else { to as f32 } } else { from as f32 };
-            let steep = |k: usize| slope[k].abs() > STEEP[usize::from(k > 0)] * most[usize::from(k > 0)];
+            let steep = |k: usize| steepest[k].abs() > STEEP[usize::from(k > 0)] * most[usize::from(k > 0)];
             let narrow = !first && !last && (to - from < NARROW || (0..4).any(steep));
             let margins = [low + margin(stepped[0]), high - margin(stepped[1])];
             lines.all.push(Line {
-                value: knots.value[i].map(|v| v as f32),
+                value: value.map(|v| v as f32),
                 slope: slope.map(|v| v as f32),
                 low,
                 high,
-                start,
+                start: start as f32,
                 shows: f32::from(u8::from(seen)),
                 inner: if narrow { [f32::INFINITY, f32::NEG_INFINITY] } else { margins },
-                rest: [0.0; 2],
+                curve: curve as f32,
+                rest: 0.0,
             });
             lines.shown.push(lines.shown[lines.shown.len() - 1] + u32::from(seen));
             lines.narrow.push(lines.narrow[lines.narrow.len() - 1] + u32::from(narrow));

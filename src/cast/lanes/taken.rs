@@ -20,6 +20,7 @@ struct OnLines {
     inner: [Lanes; 2],
     start: Lanes,
     shows: Lanes,
+    curve: Lanes,
     value: [Lanes; 4],
     slope: [Lanes; 4],
 }
@@ -44,6 +45,7 @@ impl Default for Taken {
             inner: [none; 2],
             start: none,
             shows: none,
+            curve: none,
             value: [none; 4],
             slope: [none; 4],
         };
@@ -61,7 +63,7 @@ impl OnLines {
         let line = &scene.lines.all[number];
         self.number[l] = number;
         (self.inner[0][l], self.inner[1][l]) = (line.inner[0], line.inner[1]);
-        (self.start[l], self.shows[l]) = (line.start, line.shows);
+        (self.start[l], self.shows[l], self.curve[l]) = (line.start, line.shows, line.curve);
         for k in 0..4 {
             (self.value[k][l], self.slope[k][l]) = (line.value[k], line.slope[k]);
         }
@@ -209,14 +211,22 @@ impl Taken {
             return;
         }
         let direct = scene.frame.exact.direct;
-        let start = lanes(simd, &self.lines.start);
+        let (start, curve) = (lanes(simd, &self.lines.start), lanes(simd, &self.lines.curve));
         let (value, slope) = (four(simd, &self.lines.value), four(simd, &self.lines.slope));
         for slot in from..to.min(SLOTS) {
             let a = four(simd, &self.a[slot]);
             let length = lanes(simd, &self.kept[slot]);
-            let stretch = Stretch { offset: a[0] - start, rise: [a[1], a[2], a[3]], length, value, slope };
-            let own = stretch.integrate(simd, direct);
-            let deep = own.depth.simd_gt(f32x8::splat(simd, DEEPEST));
+            let stretch = Stretch { offset: a[0] - start, rise: [a[1], a[2], a[3]], length, value, slope, curve };
+            let most = f32x8::splat(simd, DEEPEST);
+            let (own, deep) = if scene.lines.are_curved {
+                let own = stretch.integrate_logarithm(simd, direct);
+                let deep = stretch.is_bent(simd) | own.depth.simd_gt(most);
+                (own, deep)
+            } else {
+                let own = stretch.integrate(simd, direct);
+                let deep = own.depth.simd_gt(most);
+                (own, deep)
+            };
             let done = length.simd_gt(zero) & !deep;
             let light = &mut self.cut.light[slot];
             for k in 0..3 {
@@ -230,7 +240,7 @@ impl Taken {
         }
     }
 
-    /// Has the rays of the bits `deep` wait, whose depths are too great.
+    /// Has the rays of the bits `deep` wait, whose depths are too great, or values too bent for a logarithm.
     #[inline(never)]
     fn wait(&mut self, slot: usize, deep: u64) {
         let a = &self.a[slot];

@@ -15,7 +15,7 @@ use super::super::grid::constant;
 use super::super::polynomial::inverse;
 use super::super::{OPAQUE_DEPTH, THINNEST};
 use crate::integral::Exact;
-use crate::integral::cubic::stretch::{DEEPEST, LANES, Stretch, shallow};
+use crate::integral::cubic::stretch::{DEEPEST, LANES, Stretch};
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, dispatch, f32x8, f64x8, mask32x8, mask64x8};
 use rayon::prelude::*;
@@ -286,7 +286,7 @@ impl Parabolas {
         }
         let rise = [first, second, zero];
         for (sum, l) in sums.iter_mut().zip(self.lengths).take(self.degree) {
-            let stretch = Stretch { offset, rise, length: h * l, value, slope };
+            let stretch = Stretch { offset, rise, length: h * l, value, slope, curve: zero };
             let own = stretch.integrate(simd, self.direct);
             let deep = own.depth.simd_gt(f32x8::splat(simd, DEEPEST));
             if deep.to_bitmask() == 0 {
@@ -302,16 +302,14 @@ impl Parabolas {
     fn panels<S: Simd>(&self, simd: S, whole: &Stretch<S>, sum: &mut [f32x8<S>; 4]) {
         let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
         let [first, second, _] = whole.rise;
-        let a = [whole.offset, first, second, zero];
         let mut on = whole.length.simd_gt(zero);
         let mut u = zero;
         for panel in 0..PANELS {
             let offset = second.mul_add(u, first).mul_add(u, whole.offset);
-            let (h, cut) = shallow(simd, &a, [u, one - u, offset], whole.length, [whole.value[0], whole.slope[0]], on);
-            let bend = second * u;
-            let rise = [h * (first + bend + bend), h * h * second, zero];
-            let part = Stretch { offset, rise, length: on.select(whole.length * h, zero), ..*whole };
-            let own = part.integrate(simd, self.direct);
+            let rest = Stretch { offset, ..*whole };
+            let (h, cut) = rest.shallow(simd, u, one - u, on, false);
+            let part = rest.part(simd, u, h);
+            let own = Stretch { length: on.select(part.length, zero), ..part }.integrate(simd, self.direct);
             let cut = mask32x8::from_bitmask(simd, cut);
             let to = cut.select(u + h, one);
             // What is too thin to tell and still deep, or has taken all panels, is opaque.
