@@ -2,8 +2,8 @@
 //! neighbouring pixels in vector lanes. Nothing is gathered: a cell's numbers are the same for all of its pixels.
 //!
 //! The stages: [`screen`] projects points and deals cells to tiles, [`setup`] makes records of a tile's cells, [`outline`] finds
-//! the pixels that they may cover, [`order`] their sequence, [`fine`] finds and checks their pixels, [`measure`] integrates. Each pixel checks that what it
-//! composites is the mesh along its ray, piece after piece; those where it is not are drawn again by the walk. So the
+//! the pixels that they may cover, [`order`] their sequence, [`fine`] finds and checks their pixels, [`measure`] integrates, line by line of the function or by [`runs`]
+//! of lines. Each pixel checks that what it composites is the mesh along its ray, piece after piece; those where it is not are drawn again by the walk. So the
 //! picture is the walk's where the order fails.
 
 mod doubles;
@@ -14,6 +14,7 @@ mod lanes;
 mod measure;
 mod order;
 mod outline;
+mod runs;
 mod setup;
 #[cfg(test)]
 pub(crate) mod tests;
@@ -29,6 +30,7 @@ use fearless_simd::{Level, Simd};
 use fine::{Canvas, Flaw};
 use order::Order;
 use rayon::prelude::*;
+use runs::Runs;
 use setup::{Records, Scene};
 use std::ops::ControlFlow;
 use std::sync::Mutex;
@@ -169,13 +171,12 @@ impl Sweep {
         let (cells, faces) = (Dealt::new(&lens, of_cells), Dealt::new(&lens, of_faces));
         let (exact, blend) = (frame.integral.exact, frame.view.blend());
         let steepest = exact.opacity.steepest();
-        let color = |k: usize| [&exact.opacity.value, &exact.opacity.slope].map(|v| [v[k][1], v[k][2], v[k][3], 0.0]);
-        let colors: Vec<_> = (0..exact.opacity.len()).map(color).collect();
+        let runs = Runs::new(&exact.opacity);
         let mut scene = Scene {
             geometry,
             values,
             exact,
-            colors: &colors,
+            runs: &runs,
             steepest,
             blend,
             lines: &[],

@@ -9,7 +9,7 @@ pub(super) const LANES: usize = 16;
 pub(super) type Floats<S> = f32x16<S>;
 
 /// Optical depth up to which the shorter series holds.
-const FAINT: f32 = 1.0 / 8.0;
+pub(super) const FAINT: f32 = 1.0 / 8.0;
 
 /// Opacity and the weights of the emission at both ends of pieces of optical depths `x` and `y`. What is below 0 is rounding,
 /// much of it beside great depths, and taken for 0.

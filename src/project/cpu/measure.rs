@@ -4,7 +4,7 @@
 
 use super::find::MOST_BLOCKS;
 use super::fine::{Canvas, PIXELS, window, window_mut};
-use super::lanes::{Floats, LANES, piece};
+use super::lanes::{FAINT, Floats, LANES, piece};
 use super::setup::{Record, Records, Scene};
 use crate::integral::{Exact, Integral};
 use crate::view::Blend;
@@ -32,7 +32,7 @@ pub(super) struct Part {
 /// What vectors of fragments emit and absorb: red, green and blue, and opacity.
 type Lit<S> = ([Floats<S>; 3], Floats<S>);
 
-/// What pieces on line `k` of the function do, between these values and of this length.
+/// What pieces on line `k` of the function do, between these values, of this length, and of these optical depths at their ends.
 #[inline(always)]
 fn lit<S: Simd, const N: usize>(
     simd: S,
@@ -41,18 +41,32 @@ fn lit<S: Simd, const N: usize>(
     k: usize,
     ends: [Floats<S>; 2],
     length: Floats<S>,
+    [x, y]: [Floats<S>; 2],
 ) -> Lit<S> {
     let of = |v: f32| Floats::splat(simd, v);
-    let knots = &exact.opacity;
-    let (value, slope) = (of(knots.value[k][0]), of(knots.slope[k][0]));
-    let (f, b) = (ends[0] - knots.s[k], ends[1] - knots.s[k]);
-    let [alpha, front, back] =
-        piece(simd, f.mul_add(slope, value) * length, b.mul_add(slope, value) * length, exact.direct);
+    let (f, b) = (ends[0] - exact.opacity.s[k], ends[1] - exact.opacity.s[k]);
+    let [alpha, front, back] = piece(simd, x, y, exact.direct);
     let moment = f.mul_add(front, b * back);
     let (sum, moment) = if exact.direct { ((front + back) * length, moment * length) } else { (alpha, moment) };
-    let [value, slope] = &scene.colors[k];
+    let [value, slope] = &scene.runs.colors[k];
     let color = |c: usize| of(slope[c]).mul_add(moment, sum * value[c]);
     ([color(0), color(1), color(2)], alpha)
+}
+
+/// The optical depths of pieces of this length where they begin and end with these values, by the extinction at the lower knot of
+/// line `k` and its slope from there on.
+#[inline(always)]
+fn depths<S: Simd>(
+    simd: S,
+    exact: &Exact<f32>,
+    k: usize,
+    slope: f32,
+    ends: [Floats<S>; 2],
+    length: Floats<S>,
+) -> [Floats<S>; 2] {
+    let (value, slope) = (Floats::splat(simd, exact.opacity.value[k][0]), Floats::splat(simd, slope));
+    let (f, b) = (ends[0] - exact.opacity.s[k], ends[1] - exact.opacity.s[k]);
+    [f.mul_add(slope, value) * length, b.mul_add(slope, value) * length]
 }
 
 impl<const N: usize> Canvas<N> {
@@ -121,7 +135,8 @@ impl<const N: usize> Canvas<N> {
                 (load(&self.found.enter[i]), load(&self.found.leave[i]), load(&self.found.length[i]));
             let lines = r.lines.map(usize::from);
             let (color, alpha) = if lines[0] == lines[1] {
-                lit(simd, scene, exact, lines[0], [front, back], length)
+                let depths = depths(simd, exact, lines[0], exact.opacity.slope[lines[0]][0], [front, back], length);
+                lit(simd, scene, exact, lines[0], [front, back], length, depths)
             } else {
                 on_lines(simd, scene, exact, lines, [front, back], length)
             };
@@ -194,8 +209,9 @@ impl<const N: usize> Canvas<N> {
     }
 }
 
-/// What fragments do between these values, on the lines of the function from one to another: from the least value upward. Pieces come
-/// before those so far where the value falls along the ray, behind them where it rises.
+/// What fragments do between these values, on the lines of the function from one to another: from the least value upward, run by run
+/// where little is absorbed, else line by line. Pieces come before those so far where the value falls along the ray, behind them
+/// where it rises.
 #[inline(always)]
 fn on_lines<S: Simd, const N: usize>(
     simd: S,
@@ -216,22 +232,35 @@ fn on_lines<S: Simd, const N: usize>(
     if last - first > FEW_LINES {
         let low = there.select(least, of(f32::INFINITY)).reduce_min();
         let high = there.select(most, of(f32::NEG_INFINITY)).reduce_max();
-        first += knots.s[first + 1..=last].iter().take_while(|&&s| s < low).count();
-        last -= knots.s[first + 1..=last].iter().rev().take_while(|&&s| s > high).count();
+        (first, last) = (first.max(knots.interval(low)), last.min(knots.interval(high)));
     }
     let per = length / flat.select(one, rise);
     let (mut color, mut alpha) = ([zero; 3], zero);
-    for k in first..=last {
-        let (low, high) = (of(knots.s[k]), of(knots.s[k + 1]));
+    let (mut next, mut by_runs) = (first, !exact.direct);
+    while next <= last {
+        let k = next;
+        let until = if by_runs { scene.runs.last(k).min(last) } else { k };
+        let (low, high) = (of(knots.s[k]), of(knots.s[until + 1]));
         let ends = [front.max(low).min(high), back.max(low).min(high)];
         // All of it, or a part. A constant is on the line that begins there.
         let within = least.simd_ge(low) & most.simd_le(high) & !(flat & most.simd_ge(high));
         let some = there & (within | ends[0].simd_lt(ends[1]) | ends[1].simd_lt(ends[0]));
         if some.to_bitmask() == 0 {
+            next = until + 1;
             continue;
         }
         let part = some.select(within.select(length, (ends[1] - ends[0]) * per), zero);
-        let (own, opacity) = lit(simd, scene, exact, k, ends, part);
+        let slope = if until > k { scene.runs.slope(k) } else { knots.slope[k][0] };
+        let depths = depths(simd, exact, k, slope, ends, part);
+        if until > k && depths[0].max(depths[1]).simd_gt(of(FAINT)).to_bitmask() != 0 {
+            by_runs = false;
+            continue;
+        }
+        next = until + 1;
+        let (mut own, opacity) = lit(simd, scene, exact, k, ends, part, depths);
+        if until > k {
+            scene.runs.bend(simd, knots, k + 1..=until, ends, [depths[0], depths[1], opacity], &mut own);
+        }
         let (seen_so_far, seen_own) = (rises.select(one, one - opacity), rises.select(one - alpha, one));
         for c in 0..3 {
             color[c] = color[c].mul_add(seen_so_far, own[c] * seen_own);

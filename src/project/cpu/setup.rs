@@ -16,6 +16,7 @@
 
 use super::doubles::{by_cell, cross, guard, single, singles, terms, turn, wide};
 use super::outline::{Blocks, add_blocks};
+use super::runs::Runs;
 use crate::geometry::{Cell, Geometry, Values};
 use crate::integral::Exact;
 use crate::memory::prefetch;
@@ -150,8 +151,8 @@ pub(super) struct Scene<'a, const N: usize> {
     pub(super) geometry: &'a Geometry,
     pub(super) values: &'a Values<N>,
     pub(super) exact: &'a Exact<f32>,
-    /// Red, green and blue of each line of the function at its lower knot, and their slopes.
-    pub(super) colors: &'a [[[f32; 4]; 2]],
+    /// The lines of the function.
+    pub(super) runs: &'a Runs,
     /// The greatest extinction of the function.
     pub(super) steepest: f32,
     pub(super) blend: Blend,
