@@ -8,8 +8,8 @@ use super::lanes::{FAINT, Floats, LANES, piece};
 use super::setup::{Record, Records, Scene};
 use crate::integral::{Exact, Integral};
 use crate::view::Blend;
-use fearless_simd::Simd;
 use fearless_simd::prelude::*;
+use fearless_simd::{Simd, mask32x16};
 
 /// So many lines are tried one after another.
 const FEW_LINES: usize = 3;
@@ -228,18 +228,17 @@ fn on_lines<S: Simd, const N: usize>(
     let rise = back - front;
     let (flat, rises) = (rise.simd_eq(zero), rise.simd_ge(zero));
     let (least, most) = (front.min(back), front.max(back));
-    // Lines that only the cell's other fragments are on.
-    if last - first > FEW_LINES {
-        let low = there.select(least, of(f32::INFINITY)).reduce_min();
-        let high = there.select(most, of(f32::NEG_INFINITY)).reduce_max();
-        (first, last) = (first.max(knots.interval(low)), last.min(knots.interval(high)));
+    let (runs, mut by_runs) = (scene.runs, !exact.direct && last - first > FEW_LINES);
+    // Two runs are tried before it is known which lines the block is on.
+    if !by_runs || runs.last((runs.last(first) + 1).min(last)) < last {
+        [first, last] = of_block(simd, exact, [first, last], there, [least, most]);
     }
     let per = length / flat.select(one, rise);
     let (mut color, mut alpha) = ([zero; 3], zero);
-    let (mut next, mut by_runs) = (first, !exact.direct);
+    let mut next = first;
     while next <= last {
         let k = next;
-        let until = if by_runs { scene.runs.last(k).min(last) } else { k };
+        let until = if by_runs { runs.last(k).min(last) } else { k };
         let (low, high) = (of(knots.s[k]), of(knots.s[until + 1]));
         let ends = [front.max(low).min(high), back.max(low).min(high)];
         // All of it, or a part. A constant is on the line that begins there.
@@ -250,16 +249,17 @@ fn on_lines<S: Simd, const N: usize>(
             continue;
         }
         let part = some.select(within.select(length, (ends[1] - ends[0]) * per), zero);
-        let slope = if until > k { scene.runs.slope(k) } else { knots.slope[k][0] };
+        let slope = if until > k { runs.slope(k) } else { knots.slope[k][0] };
         let depths = depths(simd, exact, k, slope, ends, part);
         if until > k && depths[0].max(depths[1]).simd_gt(of(FAINT)).to_bitmask() != 0 {
             by_runs = false;
+            [next, last] = of_block(simd, exact, [next, last], there, [least, most]);
             continue;
         }
         next = until + 1;
         let (mut own, opacity) = lit(simd, scene, exact, k, ends, part, depths);
         if until > k {
-            scene.runs.bend(simd, knots, k + 1..=until, ends, [depths[0], depths[1], opacity], &mut own);
+            runs.bend(simd, knots, k + 1..=until, ends, [depths[0], depths[1], opacity], &mut own);
         }
         let (seen_so_far, seen_own) = (rises.select(one, one - opacity), rises.select(one - alpha, one));
         for c in 0..3 {
@@ -268,6 +268,23 @@ fn on_lines<S: Simd, const N: usize>(
         alpha = (one - alpha).mul_add(opacity, alpha);
     }
     (color, alpha)
+}
+
+/// Of a cell's lines, from one to another, those that the fragments of a block are on.
+#[inline(always)]
+fn of_block<S: Simd>(
+    simd: S,
+    exact: &Exact<f32>,
+    [first, last]: [usize; 2],
+    there: mask32x16<S>,
+    [least, most]: [Floats<S>; 2],
+) -> [usize; 2] {
+    if last - first <= FEW_LINES {
+        return [first, last];
+    }
+    let low = there.select(least, Floats::splat(simd, f32::INFINITY)).reduce_min();
+    let high = there.select(most, Floats::splat(simd, f32::NEG_INFINITY)).reduce_max();
+    [first.max(exact.opacity.interval(low)), last.min(exact.opacity.interval(high))]
 }
 
 /// Rows of four as four columns.
