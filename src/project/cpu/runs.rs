@@ -14,8 +14,10 @@ use crate::integral::Knots;
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
-/// The most lines of a run: turns of slopes add up, and so do their roundings.
+/// The most lines of a run, and the most that turns of slopes along it amount to, each over all of its width, in the brightest
+/// colours: their roundings add up.
 const LONGEST: usize = 32;
+const CROOKED: f32 = 16.0;
 
 /// By how much of itself, and of the places of knots, extinction may be beside the line of a run: what f32 has rounded.
 const BESIDE: f64 = 2e-7;
@@ -45,13 +47,13 @@ impl Runs {
         let count = knots.len();
         let of = |k: usize| [&knots.value, &knots.slope].map(|v| [v[k][1], v[k][2], v[k][3], 0.0]);
         let colors: Vec<_> = (0..count).map(of).collect();
+        let bends: Vec<_> = (0..count).map(|k| if k == 0 { Bend::default() } else { Bend::new(knots, k) }).collect();
         let mut last = Vec::with_capacity(count);
         while last.len() < count {
             let first = last.len();
-            let (end, slope) = run(knots, first);
+            let (end, slope) = run(knots, &bends, first);
             last.extend((first..=end).map(|_| (end as u16, slope)));
         }
-        let bends = (0..count).map(|k| if k == 0 { Bend::default() } else { Bend::new(knots, k) }).collect();
         Runs { colors, last, bends }
     }
 
@@ -109,8 +111,10 @@ impl Runs {
 }
 
 /// The last line of the run that begins with line `first`, and the slope of extinction along it.
-fn run(knots: &Knots<f32>, first: usize) -> (usize, f32) {
+fn run(knots: &Knots<f32>, bends: &[Bend], first: usize) -> (usize, f32) {
     let count = knots.len();
+    let brightest = |k: usize| knots.value[k][1..].iter().fold(0.0, |most: f32, v| most.max(*v));
+    let (mut turns, mut bright) = (0.0, brightest(first));
     let (place, depth) = (|k: usize| f64::from(knots.s[k]), |k: usize| f64::from(knots.value[k][0]));
     let (mut end, mut slope) = (first, knots.slope[first][0]);
     // The outer lines are no part of any: they are as long as f32 can tell.
@@ -124,7 +128,9 @@ fn run(knots: &Knots<f32>, first: usize) -> (usize, f32) {
         let own = (depth(to) - depth(first)) / width;
         let most = BESIDE * (high + own.abs() * place(first).abs().max(place(to).abs()));
         let is_beside = |k: usize| (depth(first) + own * (place(k) - place(first)) - depth(k)).abs() > most;
-        if (first + 1..to).any(is_beside) {
+        turns += bends[end + 1].turn.map_or(0.0, |turn| turn.iter().fold(0.0, |most: f32, v| most.max(v.abs())));
+        bright = bright.max(brightest(end + 1));
+        if turns * width as f32 > CROOKED * bright || (first + 1..to).any(is_beside) {
             break;
         }
         (end, slope) = (end + 1, own as f32);
@@ -183,7 +189,7 @@ mod tests {
     use crate::integral::Exact;
     use crate::transfer::TransferFunction;
 
-    fn knots(color: Vec<(f64, [f64; 3])>, opacity: Vec<(f64, f64)>) -> Knots<f32> {
+    fn knots_of(color: Vec<(f64, [f64; 3])>, opacity: Vec<(f64, f64)>) -> Knots<f32> {
         let transfer = TransferFunction::new(color, opacity, 1.0).unwrap();
         Exact::<f32>::new(&transfer, Kind::Scalar, &[Normal { mid: 0.0, half: 1.0 }; 4], 1.0).opacity
     }
@@ -191,9 +197,13 @@ mod tests {
     #[test]
     fn lines_of_one_extinction_are_runs() {
         let color = (0..=10).map(|i| (f64::from(i) / 10.0, [f64::from(i % 3), 0.5, 0.0])).collect();
-        let knots = knots(color, vec![(0.0, 0.1), (0.45, 0.55), (0.73, 0.0), (1.0, 0.0)]);
+        let knots = knots_of(color, vec![(0.0, 0.1), (0.45, 0.55), (0.73, 0.0), (1.0, 0.0)]);
         let runs = Runs::new(&knots);
         let of: Vec<usize> = (0..knots.len()).map(|k| runs.last(k)).collect();
+        // Bands, whose edges are too steep.
+        let color = (0..5).flat_map(|i| [0.001, 0.199].map(|e| (f64::from(i) / 5.0 + e, [f64::from(i % 2), 0.5, 0.0])));
+        let bands = Runs::new(&knots_of(color.collect(), vec![(0.0, 1.0), (1.0, 1.0)]));
+        assert!((0..bands.colors.len()).all(|k| bands.last(k) <= k + 1));
         // Lines begin beyond all, then at 0, 0.1 … 0.4, 0.45, 0.5 … 0.7, 0.73, 0.8, 0.9, and the last knots'.
         assert_eq!(of[..14], [0, 5, 5, 5, 5, 5, 9, 9, 9, 9, 12, 12, 12, 13]);
         for (k, want) in [(1, 1.0), (5, 1.0), (6, -0.55 / 0.28), (10, 0.0)] {
