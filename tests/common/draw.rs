@@ -135,7 +135,6 @@ pub(crate) enum Shape {
     Peak,
     Steps,
     Knots(usize),
-    Even(usize),
     /// Up to 1 and beyond.
     Wall,
 }
@@ -161,7 +160,6 @@ impl Shape {
             Shape::Knots(n) => {
                 (0..n).map(|i| ((i as f64 + random.within(0.25, 0.75)) / n as f64, random.within(0.0, 1.0))).collect()
             }
-            Shape::Even(n) => (0..=n).map(|i| (i as f64 / n as f64, i as f64 / n as f64)).collect(),
             Shape::Wall => vec![(0.0, 0.0), (0.5, 0.4), (0.7, 1.0), (0.75, 1.3), (0.8, 0.2), (1.0, 0.1)],
         }
     }
@@ -171,10 +169,7 @@ impl Shape {
 #[derive(Clone, Copy)]
 pub(crate) struct Look {
     pub(crate) name: &'static str,
-    /// Of opacity.
     pub(crate) shape: Shape,
-    /// Where colours have their knots: of any colours, or of a colour map if they are even.
-    pub(crate) colors: Shape,
     /// The greatest opacity.
     pub(crate) peak: f64,
     pub(crate) convention: Convention,
@@ -186,7 +181,6 @@ pub(crate) struct Look {
 const PLAIN: Look = Look {
     name: "ramp",
     shape: Shape::Ramp,
-    colors: Shape::Knots(4),
     peak: 1.0,
     convention: Convention::Extinction,
     emission: Emission::Chromatic,
@@ -197,31 +191,16 @@ const DIRECT: Emission = Emission::Direct { scale: 0.4 };
 pub(crate) const LOOKS: &[Look] = &[
     PLAIN,
     Look { name: "peak", shape: Shape::Peak, peak: 30.0, ..PLAIN },
-    Look { name: "steps", shape: Shape::Steps, colors: Shape::Steps, peak: 2.0, ..PLAIN },
+    Look { name: "steps", shape: Shape::Steps, peak: 2.0, ..PLAIN },
     Look { name: "many knots", shape: Shape::Knots(60), peak: 3.0, ..PLAIN },
-    Look { name: "many colours", peak: 0.5, colors: Shape::Even(60), ..PLAIN },
     Look { name: "dense", shape: Shape::Knots(6), peak: 1e4, ..PLAIN },
     Look { name: "opacity", shape: Shape::Knots(5), peak: 0.97, convention: Convention::Opacity, ..PLAIN },
     Look { name: "wall", shape: Shape::Wall, convention: Convention::Opacity, ..PLAIN },
-    Look {
-        name: "stepped wall",
-        shape: Shape::Steps,
-        colors: Shape::Steps,
-        peak: 1.3,
-        convention: Convention::Opacity,
-        ..PLAIN
-    },
+    Look { name: "stepped wall", shape: Shape::Steps, peak: 1.3, convention: Convention::Opacity, ..PLAIN },
     Look { name: "direct", shape: Shape::Knots(5), emission: DIRECT, ..PLAIN },
     Look { name: "direct wall", shape: Shape::Wall, convention: Convention::Opacity, emission: DIRECT, ..PLAIN },
     Look { name: "unclamped", shape: Shape::Knots(5), clamp: false, ..PLAIN },
-    Look {
-        name: "unclamped direct",
-        shape: Shape::Steps,
-        colors: Shape::Steps,
-        emission: DIRECT,
-        clamp: false,
-        ..PLAIN
-    },
+    Look { name: "unclamped direct", shape: Shape::Steps, emission: DIRECT, clamp: false, ..PLAIN },
 ];
 
 impl Look {
@@ -241,10 +220,8 @@ impl Look {
         let last = field.kind().components() - 1;
         let opacity = self.shape.knots(random).into_iter().map(|(s, a)| (over(last, s), a * self.peak)).collect();
         let mut color = Vec::new();
-        for (s, _) in self.colors.knots(random) {
-            let wave = [0.0, 2.0, 4.0].map(|k| 0.5 + 0.5 * (7.0 * s + k).sin());
-            let even = matches!(self.colors, Shape::Even(_));
-            color.push((over(0, s), if even { wave } else { [(); 3].map(|()| random.within(0.0, 1.0)) }));
+        for (s, _) in if matches!(self.shape, Shape::Steps) { self.shape } else { Shape::Knots(4) }.knots(random) {
+            color.push((over(0, s), [(); 3].map(|()| random.within(0.0, 1.0))));
         }
         let transfer = TransferFunction::new(color, opacity, 0.7).unwrap();
         transfer.with_convention(self.convention).with_clamp(self.clamp).with_emission(self.emission).unwrap()

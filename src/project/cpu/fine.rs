@@ -114,6 +114,9 @@ impl<const N: usize> Canvas<N> {
         if !lens.limited {
             return;
         }
+        // Of pixels beyond the image nothing is drawn: what is decided for a block depends on all of its pixels, and must not on
+        // tiles before this.
+        self.limits.iter_mut().for_each(|limits| limits.fill(0.0));
         for j in 0..TILE.min(lens.size[1] - corner[1]) {
             for i in 0..TILE.min(lens.size[0] - corner[0]) {
                 let at = place(i, j);
