@@ -131,7 +131,8 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     if let Some(path) = &options.json {
         output::check(path)?;
     }
-    if !options.also.is_empty() && !(options.orders_of_cells || options.bivariate) {
+    let of_several = options.orders_of_cells || options.bivariate;
+    if !of_several && !options.also.is_empty() {
         return Err(output::misuse("--also: other meshes are for --orders-of-cells and --bivariate"));
     }
     if options.bivariate {

@@ -116,7 +116,7 @@ impl Wide {
                     let mut q = one;
                     if cell.clips(k) {
                         q = load(simd, &room.on[k]);
-                        a = a * q;
+                        a *= q;
                     }
                     if self.is_logarithmic {
                         most = most.max(a);
@@ -128,8 +128,8 @@ impl Wide {
                     red = q.mul_add(Floats::splat(simd, widget.color[0]), red);
                     green = q.mul_add(Floats::splat(simd, widget.color[1]), green);
                     blue = q.mul_add(Floats::splat(simd, widget.color[2]), blue);
-                    white = white + q;
-                    tau = tau + a;
+                    white += q;
+                    tau += a;
                 }
             }
             Source::Scalar(_) | Source::Texels(_) => {
@@ -167,7 +167,7 @@ impl Wide {
             let normal = normal(simd, segments, u);
             let on_ray = dot(normal, segments.along);
             if let Some(p) = self.silhouette {
-                factor = factor * power(simd, (one - on_ray.abs()).max(zero), p);
+                factor *= power(simd, (one - on_ray.abs()).max(zero), p);
             }
             if let Some(light) = &self.light {
                 let [diffuse, specular] = light.coming(simd, segments, room, normal, on_ray);

@@ -439,13 +439,13 @@ impl Wide {
             let fits = depth.simd_le(Floats::splat(simd, FAINT));
             let mut tame = fits;
             if turns != 0 {
-                tame = tame & !mask32x16::from_bitmask(simd, turns);
+                tame &= !mask32x16::from_bitmask(simd, turns);
             }
             let mut opaque = 0;
             if self.is_logarithmic {
                 let most = nodes[0].most.max(nodes[1].most).max(nodes[2].most);
                 let least = nodes[0].most.min(nodes[1].most).min(nodes[2].most);
-                tame = tame & (one - least).simd_le((one - most) * FACTOR);
+                tame &= (one - least).simd_le((one - most) * FACTOR);
                 opaque = (open & most.simd_gt(Floats::splat(simd, OPAQUE))).to_bitmask();
             }
             let takes = open & tame;
@@ -455,7 +455,7 @@ impl Wide {
             green = seen.mul_add(color[1], green);
             blue = seen.mul_add(color[2], blue);
             opacity = seen.mul_add(alpha, opacity);
-            through = through - seen * alpha;
+            through -= seen * alpha;
             u = takes.select(all.select(end, u + h), u);
             panels += takes.to_bitmask().count_ones();
             let shorter = (one / depth).max(Floats::splat(simd, 0.02)).min(one) * 0.45;
@@ -465,7 +465,7 @@ impl Wide {
             let short = (open & !takes & h.simd_lt(Floats::splat(simd, SHORTEST))).to_bitmask();
             left |= short | opaque;
             let goes_on = u.simd_lt(Floats::splat(simd, 1.0 - SAME)) & through.simd_gt(Floats::splat(simd, DARK));
-            open = open & goes_on & !mask32x16::from_bitmask(simd, short | opaque);
+            open &= goes_on & !mask32x16::from_bitmask(simd, short | opaque);
         }
         left |= open.to_bitmask();
         let keep = there & !mask32x16::from_bitmask(simd, left);

@@ -44,7 +44,9 @@ fn shares(mut values: Vec<f64>) -> [f64; 3] {
     values.sort_unstable_by(f64::total_cmp);
     let at = |share: f64| values.get((share * values.len() as f64) as usize).copied().unwrap_or(0.0);
     let [low, middle, high] = [0.1, 0.5, 0.9].map(at);
-    if low < high { [low, middle, high] } else { [low, low + 0.5, low + 1.0] }
+    // What differs by rounding alone is one value.
+    let apart = high - low > 1e-6 * low.abs().max(high.abs());
+    if apart { [low, middle, high] } else { [low, low + 0.5, low + 1.0] }
 }
 
 impl Places {
