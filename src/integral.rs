@@ -16,6 +16,7 @@
 mod batch;
 pub mod choice;
 pub(crate) mod cubic;
+pub(crate) mod floats;
 mod knots;
 pub mod lookup;
 pub(crate) mod second;

@@ -7,6 +7,7 @@ mod frame;
 mod grid;
 mod largest;
 mod loaded;
+mod naming;
 mod neighbours;
 mod prepared;
 mod recover;
@@ -28,6 +29,7 @@ use crate::memory;
 use crate::mesh::Mesh;
 use crate::mesh::cells::Tetrahedra;
 use crate::project::Switches;
+use crate::project::cpu::Sweep;
 use crate::transfer::TransferFunction;
 use crate::view::{Blend, View};
 pub use answer::Answer;
@@ -67,6 +69,8 @@ pub struct Renderer {
     exact: Option<Exact<f32>>,
     /// What a second variable, or light, needs.
     extra: Extra,
+    /// The projection on the CPU that draws that in the place of a device's.
+    sweep: Option<Box<Sweep>>,
     /// The engine that was said to draw neither.
     lacking: Option<&'static str>,
     integral: Choice,
@@ -133,6 +137,7 @@ impl Renderer {
             transfer: None,
             exact: None,
             extra: Extra::default(),
+            sweep: None,
             lacking: None,
             integral: Choice::default(),
             tables: Tables::default(),
@@ -149,34 +154,6 @@ impl Renderer {
     #[cfg(test)]
     pub(crate) fn backend(&mut self) -> &mut Backend {
         &mut self.backend
-    }
-
-    fn name_device(&mut self) {
-        // Whether tables are built on the device depends on it.
-        self.key = None;
-        if self.grid.is_some() {
-            return self.name_caster();
-        }
-        let left = self.mesh.as_ref().is_some_and(|m| m.left_to_walk);
-        let second = self.transfer.as_ref().is_some_and(|t| !t.is_of_one_variable());
-        let walks = left || second;
-        self.stats.engine = if walks { Backend::Walk.engine() } else { self.backend.engine() }.into();
-        if left && self.backend.gpu().is_some() && self.stats.device != "cpu" {
-            tracing::warn!(
-                "the mesh is too flat or thin for the 32-bit floats of the device; the CPU draws it, by the walk"
-            );
-        }
-        // Nobody who left the choice to Halite on a CPU asked for another engine.
-        let chosen = self.engine != Engine::Auto || self.backend.gpu().is_some();
-        let lacking = self.backend.lacks_second().filter(|_| second && !left && chosen);
-        if let (Some(engine), true) = (lacking, lacking != self.lacking) {
-            tracing::warn!("{engine} draws neither a second variable nor light yet; the walk on the CPU draws them");
-        }
-        self.lacking = lacking;
-        (self.stats.device, self.stats.adapter) = match self.backend.gpu().filter(|_| !walks) {
-            Some(gpu) => ("gpu".into(), gpu.adapter.name.clone()),
-            None => ("cpu".into(), format!("{} threads", self.pool.current_num_threads())),
-        };
     }
 
     /// Takes `part` for changed, wherever it is kept.

@@ -128,6 +128,8 @@ pub struct Two {
     pub weights: Weights,
     /// Which cells are left out, as nothing of them can be seen.
     pub culling: Culling,
+    /// What a silhouette multiplies.
+    pub silhouettes: Silhouettes,
 }
 
 /// The most pieces of a segment.
@@ -148,7 +150,13 @@ impl Two {
 
 impl Default for Two {
     fn default() -> Self {
-        Two { method: Method::default(), pieces: 10, weights: Weights::default(), culling: Culling::default() }
+        Two {
+            method: Method::default(),
+            pieces: 10,
+            weights: Weights::default(),
+            culling: Culling::default(),
+            silhouettes: Silhouettes::default(),
+        }
     }
 }
 
@@ -199,6 +207,18 @@ pub enum Culling {
     Corners,
     /// None.
     None,
+}
+
+/// What a silhouette multiplies.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Silhouettes {
+    /// Extinction, everywhere along a segment.
+    #[default]
+    Exact,
+    /// The opacity and the light of a whole segment, by the gradient in its middle (Song et al. 2009, §6.2): it depends on how the
+    /// mesh is cut into cells.
+    Published,
 }
 
 /// How polynomials' opacity depends on the length.

@@ -4,6 +4,7 @@ mod components;
 mod texels;
 
 use super::choice::{Alpha, Choice, Form, Planes, Texels};
+use super::second::OfTwo;
 use super::table::{
     Cylindrical, Kind, Polynomial, SecondOrder, SecondOrderPolynomial, Slabs, Table, length, mix, parabola,
 };
@@ -58,6 +59,8 @@ pub struct Integral<'a> {
     pub exact: &'a Exact<f32>,
     /// What takes its place where segments are integrated.
     pub table: Option<&'a Lookup>,
+    /// What takes the place of both, of a function of two variables, or with light.
+    pub(crate) second: Option<OfTwo<'a>>,
 }
 
 impl Lookup {

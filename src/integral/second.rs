@@ -24,9 +24,10 @@ mod nodes;
 mod panel;
 mod segmented;
 mod special;
+mod wide;
 
 use super::Light as Gathered;
-use super::choice::{Method, Two};
+use super::choice::{Method, Silhouettes, Two};
 use crate::field::Normal;
 use crate::transfer::bivariate::{Shape, Source, Table, Wave, Widget};
 use crate::transfer::shading::{Light, Shading};
@@ -39,6 +40,7 @@ use glam::DVec3;
 use panel::Rules;
 use segmented::Ends;
 use special::Erf;
+pub(crate) use wide::{Cell, Room, Row, Wide, window};
 
 /// Extinction, times the unit distance, of what is opaque.
 const SOLID: f64 = 1e8;
@@ -57,6 +59,8 @@ pub(crate) struct Second {
     /// The function h(g), if there is one.
     factor: Vec<(f64, f64)>,
     shading: Option<Shading>,
+    /// The power of silhouettes of whole segments.
+    published: Option<f64>,
     /// Of each light, in normalised coordinates, but for its attenuation.
     lights: Vec<Light>,
     /// What world units were multiplied by.
@@ -202,7 +206,44 @@ fn support(widget: &Widget, transfer: &TransferFunction, longest: f64) -> [[f64;
     })
 }
 
+/// A function of two variables, or with light, and what frames that are drawn with it need besides.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct OfTwo<'a> {
+    pub(crate) second: &'a Second,
+    pub(crate) wide: &'a Wide,
+    /// A bit for each cell that may be seen; without, all may.
+    pub(crate) seen: Option<&'a [u64]>,
+    /// Of each cell, whether it may be seen, as the sweep reads it.
+    pub(crate) lines: &'a [[u16; 2]],
+    /// The longest edge of a cell, in normalised units.
+    pub(crate) longest: f64,
+}
+
 impl Segment {
+    /// Of `N` values as they are handed over, in front and behind: s and g, and the gradient if there are five. None if one is not
+    /// finite.
+    #[inline(always)]
+    pub(crate) fn new<const N: usize>(
+        second: &Second,
+        front: &[f64; N],
+        back: &[f64; N],
+        place: DVec3,
+        along: DVec3,
+        length: f64,
+    ) -> Option<Self> {
+        if !front.iter().chain(back).all(|v| v.is_finite()) {
+            return None;
+        }
+        let [values, ends] = [front, back].map(|v| second.own([v[0], v[1]]));
+        let vector = |v: &[f64; N]| match v[..] {
+            [_, _, x, y, z] => DVec3::new(x, y, z),
+            _ => DVec3::ZERO,
+        };
+        let (vector, turn) = (vector(front), vector(back) - vector(front));
+        let rise = [ends[0] - values[0], ends[1] - values[1]];
+        Some(Segment { at: values, rise, vector, turn, place, along, length })
+    }
+
     /// s and g at `u`.
     fn values(&self, u: f64) -> [f64; 2] {
         [0, 1].map(|k| self.at[k] + self.rise[k] * u)
@@ -239,11 +280,16 @@ impl Second {
         let moved = |light: &Light| Light { origin: light.origin.moved(centre, scale), ..*light };
         let factor = transfer.bivariate().and_then(Bivariate::gradient_opacity).unwrap_or_default().to_vec();
         let is_direct = transfer.emission() != Emission::Chromatic;
+        let (mut shading, mut published) = (transfer.shading().cloned(), None);
+        if two.silhouettes == Silhouettes::Published {
+            published = shading.as_mut().and_then(Shading::take_silhouette);
+        }
         Second {
             solid: Solid::new(&source, &factor, is_direct),
             source,
             factor,
-            shading: transfer.shading().cloned(),
+            shading,
+            published,
             lights: transfer.shading().map_or(vec![], |s| s.lights().iter().map(moved).collect()),
             scale,
             convention: transfer.convention(),
@@ -272,6 +318,11 @@ impl Second {
             self.add_segmented(segment, self.two.pieces, scratch, &mut own);
         } else {
             self.gather(segment, scratch, &mut own);
+        }
+        if let Some(p) = self.published {
+            let normal = (segment.vector + segment.turn * 0.5).normalize_or_zero();
+            let share = (1.0 - normal.dot(segment.along).abs()).max(0.0).powf(p);
+            own = Gathered { color: own.color.map(|c| c * share), through: 1.0 - (1.0 - own.through) * share };
         }
         light.add(own.color.map(|c| c as f32), (1.0 - own.through) as f32);
     }
@@ -379,6 +430,11 @@ impl Second {
             Convention::Opacity if a >= 1.0 => SOLID,
             Convention::Opacity => -(-a).ln_1p(),
         }
+    }
+
+    /// It for segments side by side.
+    pub(crate) fn wide(&self) -> Wide {
+        Wide::new(self)
     }
 
     /// Whether emission is not multiplied by extinction.

@@ -37,6 +37,7 @@ pub(crate) const ASIDE: DVec2 = DVec2::new(1.3e-7, 0.9e-7);
 pub(crate) struct Lens {
     origin: DVec3,
     inverse: DMat3,
+    forward: DMat3,
     direction: [DVec3; 3],
     /// Rays meet in the eye.
     pub(crate) meet: bool,
@@ -55,9 +56,17 @@ impl Lens {
         let (origin, direction) = (fan.by_pixel(fan.origin, view.size()), fan.by_pixel(fan.direction, view.size()));
         let meet = view.eye().is_some();
         let across = if meet { [direction[1], direction[2]] } else { [origin[1], origin[2]] };
-        let inverse = DMat3::from_cols(across[0], across[1], direction[0]).inverse();
-        let mut lens =
-            Lens { origin: origin[0], inverse, direction, meet, reference: 0.0, size: view.size(), limited: false };
+        let forward = DMat3::from_cols(across[0], across[1], direction[0]);
+        let mut lens = Lens {
+            origin: origin[0],
+            inverse: forward.inverse(),
+            forward,
+            direction,
+            meet,
+            reference: 0.0,
+            size: view.size(),
+            limited: false,
+        };
         let [low, high] = geometry.boundary.bounds();
         let corners = (0..8).map(|k| {
             let pick = |bit: usize, l: f64, h: f64| if k >> bit & 1 == 1 { h } else { l };
@@ -99,6 +108,18 @@ impl Lens {
     #[inline(always)]
     pub(crate) fn pixel(&self, h: DVec3) -> DVec2 {
         if self.meet { h.truncate() / h.z } else { h.truncate() }
+    }
+
+    /// The point at depth `w` of the ray at a column and row.
+    pub(crate) fn point(&self, column: f64, row: f64, w: f64) -> DVec3 {
+        let scale = if self.meet { w } else { 1.0 };
+        self.origin + self.forward * DVec3::new(column * scale, row * scale, w)
+    }
+
+    /// The direction of the ray at a column and row, of length 1.
+    pub(crate) fn direction(&self, column: f64, row: f64) -> DVec3 {
+        let [middle, across, down] = self.direction;
+        if self.meet { (middle + across * column + down * row).normalize() } else { middle.normalize() }
     }
 
     /// Whether columns, rows and depth are a left-handed system.

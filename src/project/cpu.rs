@@ -2,8 +2,9 @@
 //! neighbouring pixels in vector lanes. Nothing is gathered: a cell's numbers are the same for all of its pixels.
 //!
 //! The stages: [`screen`] projects points and deals cells to tiles, [`setup`] makes records of a tile's cells, [`outline`] finds
-//! the pixels that they may cover, [`order`] their sequence, [`fine`] finds and checks their pixels, [`measure`] integrates, line by line of the function or by [`runs`]
-//! of lines. Each pixel checks that what it composites is the mesh along its ray, piece after piece; those where it is not are drawn again by the walk. So the
+//! the pixels that they may cover, [`order`] their sequence, [`fine`] finds and checks their pixels, [`measure`] integrates, line by
+//! line of the function or by [`runs`] of lines, functions of two variables and light in [`mod@second`]. Each pixel checks that what it
+//! composites is the mesh along its ray, piece after piece; those where it is not are drawn again by the walk. So the
 //! picture is the walk's where the order fails.
 
 mod doubles;
@@ -15,6 +16,7 @@ mod measure;
 mod order;
 mod outline;
 mod runs;
+mod second;
 mod setup;
 #[cfg(test)]
 pub(crate) mod tests;
@@ -41,6 +43,9 @@ const MOST_PIXELS: u32 = 1 << 15;
 
 /// The most points of a transfer function: 16 bits number the lines between them.
 const MOST_KNOTS: usize = u16::MAX as usize;
+
+/// What [`OfTwo::lines`](crate::integral::second::OfTwo::lines) has of a cell of which nothing is seen; of others it has zeros.
+pub(crate) const UNSEEN: [u16; 2] = setup::UNSEEN;
 
 /// So many cells before it is drawn, a cell's memory is brought near.
 const AHEAD: usize = 2;
@@ -71,6 +76,8 @@ pub(crate) struct Counts {
     pub(crate) cells: u64,
     /// Segments of rays in cells.
     pub(crate) fragments: u64,
+    /// Panels that such segments of two variables, or with light, were summed up in.
+    pub(crate) panels: u64,
     /// Pixels drawn again: as cells overlapped, as a part of the mesh was missing, as the boundary said otherwise, as f32
     /// was too coarse.
     pub(crate) redrawn: [u64; 4],
@@ -125,6 +132,7 @@ struct Target<'a> {
 struct Done {
     cells: u64,
     fragments: u64,
+    panels: u64,
     covered: u64,
     flawed: Vec<(usize, Flaw)>,
 }
@@ -170,7 +178,8 @@ impl Sweep {
         screen::all_bounds(&lens, points, places, all.len(), |i| all[i].points, of_faces);
         let (cells, faces) = (Dealt::new(&lens, of_cells), Dealt::new(&lens, of_faces));
         let (exact, blend) = (frame.integral.exact, frame.view.blend());
-        let steepest = exact.opacity.steepest();
+        // How dense functions of two variables are is known to each segment.
+        let steepest = if frame.integral.second.is_some() { 0.0 } else { exact.opacity.steepest() };
         let runs = Runs::new(&exact.opacity);
         let mut scene = Scene {
             geometry,
@@ -184,10 +193,11 @@ impl Sweep {
             boxes: &self.boxes[0],
             face_boxes: &self.boxes[1],
         };
-        if blend == Blend::Composite && self.lines.len() != geometry.cells.len() {
+        let own_lines = frame.integral.second.map(|two| two.lines);
+        if blend == Blend::Composite && own_lines.is_none() && self.lines.len() != geometry.cells.len() {
             scene.all_lines(&mut self.lines);
         }
-        scene.lines = &self.lines;
+        scene.lines = own_lines.unwrap_or(&self.lines);
 
         let mut targets = targets(&mut pixels, &lens);
         let (done, tiles, stopped) = (AtomicUsize::new(0), targets.len(), AtomicBool::new(false));
@@ -216,6 +226,7 @@ impl Sweep {
         for tile in drawn {
             counts.cells += tile.cells;
             counts.fragments += tile.fragments;
+            counts.panels += tile.panels;
             covered += tile.covered;
             for (pixel, flaw) in tile.flawed {
                 flawed.push(pixel);
@@ -234,7 +245,10 @@ impl Sweep {
             return walk(frame, Counts { handed_over: Some("too many pixels failed their checks"), ..counts });
         }
         let Frame { integral, color, view, .. } = *frame;
-        let again = cpu::render_pixels(geometry, values, integral, color, view, &flawed);
+        let again = match integral.second {
+            Some(two) => cpu::render_pixels_of_two(geometry, values, two.second, two.seen, view, &flawed),
+            None => cpu::render_pixels(geometry, values, integral, color, view, &flawed),
+        };
         flawed.iter().zip(again).for_each(|(&i, p)| pixels[i] = p);
         (pixels, counts)
     }
@@ -279,6 +293,7 @@ impl Sweep {
             flawed.push(((corner[1] + j) as usize * width + (corner[0] + i) as usize, flaw));
         });
         done.fragments = std::mem::take(&mut canvas.fragments);
+        done.panels = canvas.kept.take_panels();
         done
     }
 }
@@ -365,7 +380,10 @@ fn sweep<S: Simd, const N: usize>(
 /// Has the walk draw all of a frame.
 fn walk<const N: usize>(frame: &Frame<N>, mut counts: Counts) -> (Vec<[f32; 4]>, Counts) {
     let Frame { geometry, values, integral, view, color, progress } = *frame;
-    let (image, walked) = cpu::render(geometry, values, integral, color, view, progress);
+    let (image, walked) = match integral.second {
+        Some(two) => cpu::render_two(geometry, values, two.second, two.seen, view, progress),
+        None => cpu::render(geometry, values, integral, color, view, progress),
+    };
     counts.walked = walked;
     (image.pixels, counts)
 }

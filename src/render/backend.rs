@@ -134,13 +134,21 @@ impl Backend {
         matches!(self, Backend::WalkOnDevice(_))
     }
 
-    /// What it cannot draw a second variable or light with; none if it can.
+    /// What cannot draw a second variable or light; none if it can.
     pub(super) fn lacks_second(&self) -> Option<&'static str> {
         match self {
-            Backend::Walk => None,
+            Backend::Walk | Backend::Project(_) => None,
             Backend::WalkOnDevice(_) => Some("the walk on a device"),
-            Backend::Project(_) => Some("the projection on the CPU"),
             Backend::ProjectOnDevice(_) => Some("the projection on a device"),
+        }
+    }
+
+    /// Whether a second variable and light are drawn by the projection on the CPU, with `engine` asked for; else by the walk.
+    pub(super) fn projects_second(&self, engine: Engine) -> bool {
+        match self {
+            Backend::Walk => false,
+            Backend::WalkOnDevice(_) => engine == Engine::Auto,
+            Backend::Project(_) | Backend::ProjectOnDevice(_) => true,
         }
     }
 
@@ -197,7 +205,8 @@ impl Backend {
 
 /// The integral as the CPU reads it: exact where a device alone has the table.
 fn integral<'a>(frame: &Frame<'a>) -> Integral<'a> {
-    Integral { exact: frame.exact, table: frame.table.map(|t| &**t).filter(|t| t.source().is_none()) }
+    let table = frame.table.map(|t| &**t).filter(|t| t.source().is_none());
+    Integral { exact: frame.exact, table, second: None }
 }
 
 fn walk<const N: usize>(frame: &Frame, values: &Values<N>) -> Drawn {
@@ -227,14 +236,18 @@ fn project_by<const N: usize>(sweep: &mut Sweep, frame: &Frame, values: &Values<
         return Err(Error::Device("the projection engine has variants on a graphics device only".into()));
     }
     let color = |v: &[f32; N]| frame.largest(v);
-    let (pixels, counts) = sweep.render(&sweep::Frame {
+    Ok(swept(sweep.render(&sweep::Frame {
         geometry: &frame.mesh.geometry,
         values,
         integral: integral(frame),
         view: frame.view,
         color: &color,
         progress: frame.progress,
-    });
+    })))
+}
+
+/// What the projection on the CPU drew.
+pub(super) fn swept((pixels, counts): (Vec<[f32; 4]>, sweep::Counts)) -> Drawn {
     let [overlaps, gaps, boundary, dense] = counts.redrawn;
     let sweep = SweepStats {
         dealt_cells: counts.cells,
@@ -247,7 +260,8 @@ fn project_by<const N: usize>(sweep: &mut Sweep, frame: &Frame, values: &Values<
     };
     let mut walked = counts.walked;
     walked.steps += counts.fragments;
-    Ok(Drawn { pixels, counts: walked, sweep: Some(sweep), ..Drawn::default() })
+    walked.panels += counts.panels;
+    Drawn { pixels, counts: walked, sweep: Some(sweep), ..Drawn::default() }
 }
 
 fn project_on<const N: usize>(project: &mut Project, frame: &Frame, values: &Values<N>) -> Result<Drawn> {

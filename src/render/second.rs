@@ -1,6 +1,7 @@
 //! Frames whose transfer function has a second variable, or light: what they need besides the field, kept as long as it
-//! holds. The walk on the CPU draws them.
+//! holds. The CPU draws them: the projection, or the walk.
 
+use super::backend::{Backend, swept};
 use super::{Drawn, Loaded, Progress, Renderer, Stats, missing, ms};
 use crate::error::{Error, Result};
 use crate::field::gradient::length;
@@ -9,11 +10,14 @@ use crate::field::{Association, Field, Gradient, Kind, Normal};
 use crate::geometry::{Geometry, Values};
 use crate::image::Image;
 use crate::integral::choice::{Culling, Two};
-use crate::integral::second::{LONGEST, Pairs, Second, places};
+use crate::integral::second::{LONGEST, OfTwo, Pairs, Second, Wide, places};
+use crate::integral::{Exact, Integral};
+use crate::project::cpu::{self as sweep, Sweep, UNSEEN};
 use crate::transfer::TransferFunction;
 use crate::transfer::bivariate::{Bivariate, Source};
 use crate::traverse::cpu::render_two;
 use crate::view::{Blend, View};
+use glam::DVec3;
 use rayon::prelude::*;
 use std::time::Instant;
 
@@ -26,8 +30,28 @@ pub(super) struct Extra {
     /// The gradient in world units, for the field and the points of now; the scale that it was made under.
     gradient: Option<Gradient>,
     values: Option<Ready>,
-    function: Option<Second>,
+    function: Option<Function>,
     seen: Option<Seen>,
+    /// Of each cell, whether it may be seen, as the sweep reads it; none for the walk.
+    lines: Vec<[u16; 2]>,
+}
+
+/// The function, ready for the values.
+#[derive(Debug)]
+pub(super) struct Function {
+    second: Second,
+    wide: Wide,
+    /// What the sweep reads in the place of a function of one variable: one value.
+    even: Exact<f32>,
+}
+
+/// What a frame is drawn from.
+#[derive(Debug)]
+struct Made<'a> {
+    values: &'a TwoOrFive,
+    function: &'a Function,
+    seen: Option<&'a Seen>,
+    lines: &'a [[u16; 2]],
 }
 
 /// Which cells may be seen with the function of now.
@@ -57,22 +81,29 @@ pub(super) enum TwoOrFive {
 }
 
 impl Renderer {
-    /// Draws a frame with a second variable, or light, by the walk on the CPU.
+    /// Draws a frame with a second variable, or light, on the CPU.
     pub(super) fn render_second(&mut self, view: &View, progress: &Progress) -> Result<Image> {
         let start = Instant::now();
         if self.mesh.as_ref().is_some_and(|m| !m.connected) {
             self.connect_in_place()?;
         }
-        let mesh = self.mesh.as_ref().ok_or_else(|| missing("mesh"))?;
+        let mesh = self.mesh.as_mut().ok_or_else(|| missing("mesh"))?;
         let field = self.field.as_ref().ok_or_else(|| missing("field"))?.field();
         let transfer = self.transfer.as_ref().ok_or_else(|| missing("transfer function"))?;
         let (extra, two) = (&mut self.extra, self.integral.two);
+        let projects = !mesh.left_to_walk && self.backend.projects_second(self.engine);
+        let sweep = match (&mut self.backend, projects) {
+            (_, false) => None,
+            (Backend::Project(sweep), _) => Some(&mut **sweep),
+            _ => Some(&mut **self.sweep.get_or_insert_with(|| Box::new(Sweep::new()))),
+        };
         let drawn = self.pool.install(|| {
-            let (values, second, seen) = extra.prepare(mesh, field, transfer, view.blend(), two)?;
-            let culled = seen.map_or((0, 0.0), |s| (s.culled, s.ms));
-            Ok::<_, Error>((draw(mesh, values, second, seen, view, progress), culled))
+            let longest = *mesh.longest.get_or_insert_with(|| mesh.geometry.longest_edge());
+            let made = extra.prepare(mesh, field, transfer, view.blend(), two, projects)?;
+            let culled = made.seen.map_or((0, 0.0), |s| (s.culled, s.ms));
+            Ok::<_, Error>((made.draw(mesh, longest, sweep, view, progress), culled))
         });
-        let (Drawn { pixels, counts, .. }, (culled_cells, culling_ms)) = drawn?;
+        let (Drawn { pixels, counts, sweep, .. }, (culled_cells, culling_ms)) = drawn?;
         self.stats = Stats {
             integral: two.method.name().into(),
             table_ms: 0.0,
@@ -88,7 +119,7 @@ impl Renderer {
             uploaded_bytes: 0,
             device_ms: None,
             projection: None,
-            sweep: None,
+            sweep,
             frame_ms: ms(start),
             ..std::mem::take(&mut self.stats)
         };
@@ -114,27 +145,30 @@ impl Extra {
     /// The transfer function is another.
     pub(super) fn forget_function(&mut self) {
         (self.function, self.seen) = (None, None);
+        self.lines.clear();
     }
 
     /// Bytes held.
     pub(super) fn bytes(&self) -> u64 {
-        let seen = self.seen.as_ref().map_or(0, |s| 8 * s.bits.len() as u64);
+        let seen = self.seen.as_ref().map_or(0, |s| 8 * s.bits.len() as u64) + 4 * self.lines.len() as u64;
         self.gradient.as_ref().map_or(0, Gradient::bytes) + self.values.as_ref().map_or(0, |v| v.values.bytes()) + seen
     }
 
-    /// Makes what is missing to draw `field` on `mesh` with `transfer`, on the current rayon pool.
+    /// Makes what is missing to draw `field` on `mesh` with `transfer`, for the projection or for the walk, on the current
+    /// rayon pool.
     ///
     /// # Errors
     /// [`Error::Field`] if the field has no gradient, or more than one component; [`Error::Render`] for a maximum;
     /// [`Error::NoMemory`].
-    pub(super) fn prepare(
+    fn prepare(
         &mut self,
         mesh: &Loaded,
         field: &Field,
         transfer: &TransferFunction,
         blend: Blend,
         two: Two,
-    ) -> Result<(&TwoOrFive, &Second, Option<&Seen>)> {
+        projects: bool,
+    ) -> Result<Made<'_>> {
         check(field, transfer, blend)?;
         two.check()?;
         let lit = transfer.shading().is_some();
@@ -173,16 +207,28 @@ impl Extra {
         }
         let Some(ready) = &self.values else { return Err(Error::Render("there are no values to draw".into())) };
         let Geometry { centre, scale, .. } = mesh.geometry;
-        let function = self.function.get_or_insert_with(|| Second::new(transfer, ready.normal, centre, scale, two));
+        let function = match self.function.take() {
+            Some(function) => function,
+            None => Function::new(transfer, ready.normal, centre, scale, two)?,
+        };
+        let second = &self.function.insert(function).second;
         if two.culling == Culling::None {
             self.seen = None;
         } else if self.seen.as_ref().is_none_or(|s| s.culling != two.culling) {
             self.seen = Some(match &ready.values {
-                TwoOrFive::Two(v) => Seen::new(&mesh.geometry, v, function, two.culling),
-                TwoOrFive::Five(v) => Seen::new(&mesh.geometry, v, function, two.culling),
+                TwoOrFive::Two(v) => Seen::new(&mesh.geometry, v, second, two.culling),
+                TwoOrFive::Five(v) => Seen::new(&mesh.geometry, v, second, two.culling),
             });
         }
-        Ok((&ready.values, function, self.seen.as_ref()))
+        let cells = mesh.geometry.cells.len();
+        if projects && self.lines.len() != cells {
+            match &self.seen {
+                None => self.lines = vec![[0; 2]; cells],
+                Some(seen) => seen.tell(cells, &mut self.lines),
+            }
+        }
+        let Some(function) = &self.function else { return Err(Error::Render("there is no function to draw".into())) };
+        Ok(Made { values: &ready.values, function, seen: self.seen.as_ref(), lines: &self.lines })
     }
 
     /// The values in the order of the mesh.
@@ -243,6 +289,22 @@ impl Seen {
         let seen: u64 = bits.iter().map(|w| u64::from(w.count_ones())).sum();
         Seen { culling, bits, culled: cells as u64 - seen, ms: ms(start) }
     }
+
+    /// Which of so many `cells` may be seen, as the sweep reads it.
+    fn tell(&self, cells: usize, lines: &mut Vec<[u16; 2]>) {
+        let line = |i: usize| if self.bits[i / 64] >> (i % 64) & 1 == 1 { [0; 2] } else { UNSEEN };
+        (0..cells).into_par_iter().with_min_len(4096).map(line).collect_into_vec(lines);
+    }
+}
+
+impl Function {
+    fn new(transfer: &TransferFunction, normal: [Normal; 2], centre: DVec3, scale: f64, two: Two) -> Result<Self> {
+        let second = Second::new(transfer, normal, centre, scale, two);
+        let even =
+            TransferFunction::new(vec![(0.0, [1.0; 3])], vec![(0.0, 1.0)], 1.0)?.with_emission(transfer.emission())?;
+        let even = Exact::new(&even, Kind::Scalar, &[normal[0]; 4], scale);
+        Ok(Function { wide: second.wide(), second, even })
+    }
 }
 
 /// Refuses what has no second variable and no light: a maximum, fields of several components, and what fields of cells have
@@ -268,19 +330,32 @@ pub(super) fn check(field: &Field, transfer: &TransferFunction, blend: Blend) ->
     ))
 }
 
-/// Draws a frame on the current rayon pool.
-fn draw(
-    mesh: &Loaded,
-    values: &TwoOrFive,
-    second: &Second,
-    seen: Option<&Seen>,
-    view: &View,
-    progress: &Progress,
-) -> Drawn {
-    let seen = seen.map(|s| &s.bits[..]);
-    let (image, counts) = match values {
-        TwoOrFive::Two(v) => render_two(&mesh.geometry, v, second, seen, view, progress),
-        TwoOrFive::Five(v) => render_two(&mesh.geometry, v, second, seen, view, progress),
-    };
-    Drawn { pixels: image.pixels, counts, ..Drawn::default() }
+impl Made<'_> {
+    /// Draws a frame on the current rayon pool, by the projection if there is one, else by the walk.
+    fn draw(&self, mesh: &Loaded, longest: f64, sweep: Option<&mut Sweep>, view: &View, progress: &Progress) -> Drawn {
+        match self.values {
+            TwoOrFive::Two(v) => self.draw_values(v, mesh, longest, sweep, view, progress),
+            TwoOrFive::Five(v) => self.draw_values(v, mesh, longest, sweep, view, progress),
+        }
+    }
+
+    fn draw_values<const N: usize>(
+        &self,
+        values: &Values<N>,
+        mesh: &Loaded,
+        longest: f64,
+        sweep: Option<&mut Sweep>,
+        view: &View,
+        progress: &Progress,
+    ) -> Drawn {
+        let (geometry, seen) = (&mesh.geometry, self.seen.map(|s| &s.bits[..]));
+        let Function { second, wide, even } = self.function;
+        let Some(sweep) = sweep else {
+            let (image, counts) = render_two(geometry, values, second, seen, view, progress);
+            return Drawn { pixels: image.pixels, counts, ..Drawn::default() };
+        };
+        let second = Some(OfTwo { second, wide, seen, lines: self.lines, longest });
+        let integral = Integral { exact: even, table: None, second };
+        swept(sweep.render(&sweep::Frame { geometry, values, integral, view, color: &|_| [0.0; 4], progress }))
+    }
 }

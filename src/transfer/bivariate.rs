@@ -230,6 +230,11 @@ impl Table {
         self.ranges
     }
 
+    /// All texels, row by row.
+    pub(crate) fn texels(&self) -> &[[f64; 4]] {
+        &self.texels
+    }
+
     /// Whether a texel is not clear.
     pub(crate) fn is_seen(&self, column: usize, row: usize) -> bool {
         self.texels[column + self.size[0] * row][3] > 0.0

@@ -142,6 +142,11 @@ impl Shading {
         self.silhouette
     }
 
+    /// Takes the silhouettes away, and says their power.
+    pub(crate) fn take_silhouette(&mut self) -> Option<f64> {
+        self.silhouette.take()
+    }
+
     /// How the colour is lit, if it is.
     pub fn shade(&self) -> Option<&Shade> {
         self.shade.as_ref()

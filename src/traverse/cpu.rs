@@ -123,9 +123,32 @@ pub(crate) fn render_pixels<const N: usize>(
     view: &View,
     indices: &[usize],
 ) -> Vec<[f32; 4]> {
+    pixels_with(geometry, values, &|| One::new(integral), pixel, view, indices)
+}
+
+/// As [`render_pixels`], of segments of two variables, or with light.
+pub(crate) fn render_pixels_of_two<const N: usize>(
+    geometry: &Geometry,
+    values: &Values<N>,
+    second: &Second,
+    seen: Option<&[u64]>,
+    view: &View,
+    indices: &[usize],
+) -> Vec<[f32; 4]> {
+    pixels_with(geometry, values, &|| Two::new(second, seen), &|_| [0.0; 4], view, indices)
+}
+
+fn pixels_with<const N: usize, S: Segments<N>>(
+    geometry: &Geometry,
+    values: &Values<N>,
+    segments: &(impl Fn() -> S + Sync),
+    pixel: &(dyn Fn(&[S::Value; N]) -> [f32; 4] + Sync),
+    view: &View,
+    indices: &[usize],
+) -> Vec<[f32; 4]> {
     let w = view.size()[0];
-    let new = || Tracer::new(geometry, values, One::new(integral), view);
-    let draw = |tracer: &mut Tracer<N, One>, &index: &usize| {
+    let new = || Tracer::new(geometry, values, segments(), view);
+    let draw = |tracer: &mut Tracer<N, S>, &index: &usize| {
         let (i, j) = ((index % w as usize) as u32, (index / w as usize) as u32);
         tracer.find_candidates([i, j], [i + 1, j + 1]);
         tracer.pixel(i, j, pixel)

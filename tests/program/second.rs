@@ -1,6 +1,6 @@
 //! Options of a second variable and light, and the histogram by which widgets are placed.
 
-use super::{Place, Ran, SCENE};
+use super::{Place, Ran, SCENE, cube};
 use halite::image::Image;
 
 fn drawn(place: &Place, arguments: &str) -> Image {
@@ -106,4 +106,41 @@ fn a_histogram_shows_where_values_are() {
 fn info_says_how_long_the_gradient_is() {
     let told = Place::new().succeeds("info cube.vtu");
     assert!(told.contains("its gradient is 1.73205 to 1.73205 long"), "{told}");
+}
+
+/// Table 1 and the figures of Song et al., of a mesh whose name the paper has and of another.
+#[test]
+fn functions_of_two_variables_are_studied() {
+    let place = Place::new();
+    place.write("bluntfin_tet.vtu", &cube());
+    let text = place.succeeds(
+        "study bluntfin_tet.vtu --bivariate --also cube.vtu --out sheet.png --json study.json --frames 1 --size 48x40",
+    );
+    for part in ["1.27 0.16 0.91", "analytic", "10 pieces, texture", "silhouettes, published", "cube "] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    assert!(std::fs::read(place.path("sheet.png")).unwrap().starts_with(b"\x89PNG"));
+    let study: serde_json::Value = serde_json::from_slice(&std::fs::read(place.path("study.json")).unwrap()).unwrap();
+    let meshes = study["meshes"].as_array().unwrap();
+    assert_eq!(meshes.len(), 2);
+    let number = |row: &serde_json::Value, key: &str| row[key].as_f64().unwrap();
+    for mesh in meshes {
+        let [one, adaptive, analytic, texture, closed, ..] = mesh["variants"].as_array().unwrap().as_slice() else {
+            panic!("{mesh}")
+        };
+        for exact in [one, adaptive, analytic] {
+            assert!(number(exact, "max") < 1e-4, "{exact}");
+        }
+        assert!([texture, closed].iter().all(|pieces| number(pieces, "max") > 2.0 * number(adaptive, "max")), "{mesh}");
+    }
+    let figures = study["figures"].as_array().unwrap();
+    let (off, exact): (Vec<_>, Vec<_>) = figures.iter().partition(|f| {
+        let name = f["figure"].as_str().unwrap();
+        name.contains("pieces") || name.contains("published")
+    });
+    assert_eq!((off.len(), exact.len()), (3, 13));
+    assert!(exact.iter().all(|f| number(f, "max") < 1e-4), "{study}");
+    assert!(off.iter().all(|f| number(f, "max") > 1e-5), "{study}");
+    place.fails("study cube.vtu --bivariate --scalars c --out sheet.png", &["no gradient"]);
+    place.misused("study cube.vtu --also cube.vtu --out sheet.png", "--bivariate");
 }

@@ -1,3 +1,4 @@
+mod bivariate;
 mod forms;
 mod orders;
 mod reconstructions;
@@ -43,13 +44,17 @@ pub(crate) struct Options {
     /// Compare the orders of cells instead: where each is wrong, and what it takes
     #[arg(long, conflicts_with = "integrals")]
     orders_of_cells: bool,
-    /// Other meshes to compare orders of cells on, as with the first; regular and rectilinear grids among them are passed over
-    #[arg(long, value_name = "FILE", num_args = 1.., requires = "orders_of_cells")]
+    /// Other meshes to compare orders of cells, or functions of two variables, on, as with the first; regular and rectilinear grids among them are passed over
+    #[arg(long, value_name = "FILE", num_args = 1..)]
     also: Vec<PathBuf>,
     /// Compare the orders of reconstruction of regular and rectilinear grids instead: figures and claims of El Hajjar et al. (2008).
     /// The first volume is that of which tables are timed; names that begin with "synth" are of stand-ins
     #[arg(long, conflicts_with_all = ["integrals", "orders_of_cells"])]
     orders: bool,
+    /// Compare functions of two variables with those of one instead, in closed form and in pieces: table 1 and the figures of Song et
+    /// al. (2009). The figures are of the first mesh
+    #[arg(long, conflicts_with_all = ["integrals", "orders_of_cells", "orders"])]
+    bivariate: bool,
     /// Another volume to compare orders on; may be given again
     #[arg(long = "volume", value_name = "FILE", requires = "orders")]
     volumes: Vec<PathBuf>,
@@ -125,6 +130,13 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     output::check_picture(&options.out)?;
     if let Some(path) = &options.json {
         output::check(path)?;
+    }
+    let of_several = options.orders_of_cells || options.bivariate;
+    if !of_several && !options.also.is_empty() {
+        return Err(output::misuse("--also: other meshes are for --orders-of-cells and --bivariate"));
+    }
+    if options.bivariate {
+        return bivariate::run(options, threads);
     }
     if options.orders {
         return reconstructions::run(options, threads);

@@ -14,13 +14,13 @@ use crate::transfer::{Convention, bivariate::Shape, interpolate, interpolate_all
 /// Nodes of a panel.
 const NODES: usize = 4;
 /// The share of what may change in a panel up to which three nodes are enough: they are exact for degree 5.
-const EASY: f64 = 0.5;
+pub(super) const EASY: f64 = 0.5;
 /// The greatest depth of a panel of three nodes.
 const SHALLOW: f64 = 0.3;
 /// The greatest depth of a panel.
-const DEEPEST: f64 = 1.5;
+pub(super) const DEEPEST: f64 = 1.5;
 /// By how many σ a Gaussian's argument moves in a panel, and by how many radians a sinusoid's, at most.
-const STEP: [f64; 2] = [1.2, 1.5];
+pub(super) const STEP: [f64; 2] = [1.2, 1.5];
 /// By what factor the argument of a power or a logarithm changes between the nodes of a panel at most.
 pub(super) const FACTOR: f64 = 2.0;
 /// The shortest panels that are halved as they bend, and those that are shortened as they are deep, as shares of a segment.
@@ -34,11 +34,11 @@ const SAME: f64 = 1e-12;
 
 /// Gauss's rule on [0, 1], and the integrals of the polynomials through its nodes from 0 to each of them.
 #[derive(Debug, Clone)]
-struct Rule {
-    nodes: Lanes,
-    weights: Lanes,
+pub(super) struct Rule {
+    pub(super) nodes: Lanes,
+    pub(super) weights: Lanes,
     /// Of each polynomial, to each node.
-    to_node: [Lanes; NODES],
+    pub(super) to_node: [Lanes; NODES],
 }
 
 impl Rule {
@@ -90,8 +90,8 @@ impl Rule {
 /// The rules of three and of four nodes.
 #[derive(Debug, Clone)]
 pub(super) struct Rules {
-    three: Rule,
-    four: Rule,
+    pub(super) three: Rule,
+    pub(super) four: Rule,
 }
 
 impl Default for Rules {

@@ -8,6 +8,7 @@
 use super::find::Found;
 use super::lanes::LANES;
 use super::measure::Parts;
+use super::second::Kept;
 use super::setup::{Look, Record, Records, Scene};
 use crate::integral::{Batch, Integral, Light};
 use crate::order::crossings::{Crossings, pixel_at, place};
@@ -58,7 +59,7 @@ pub(super) struct Canvas<const N: usize> {
     pub(super) alive: [u32; STRIPS],
     /// The number of fragments at which it is looked again for blocks that are done.
     glance: u64,
-    corner: [u32; 2],
+    pub(super) corner: [u32; 2],
     /// The length of each pixel's ray for each unit of depth.
     pub(super) stretch: Box<[f32; PIXELS]>,
     eye_inside: bool,
@@ -67,6 +68,7 @@ pub(super) struct Canvas<const N: usize> {
     pub(super) batch: Batch,
     pub(super) found: Found,
     pub(super) parts: Parts,
+    pub(super) kept: Kept,
     pub(super) fragments: u64,
 }
 
@@ -87,6 +89,7 @@ impl<const N: usize> Canvas<N> {
             batch: Batch::default(),
             found: Found::default(),
             parts: Parts::default(),
+            kept: Kept::default(),
             fragments: 0,
         }
     }
@@ -111,6 +114,7 @@ impl<const N: usize> Canvas<N> {
             *stretch = (c + i * (x + i * xx + j * xy) + j * (y + j * yy)).sqrt();
         }
         self.last.copy_from_slice(crossings.first());
+        self.kept.clear(scene, corner);
         if !lens.limited {
             return;
         }
@@ -194,11 +198,16 @@ impl<const N: usize> Canvas<N> {
     /// Flags pixels of the `i`-th block kept through which too much light comes after a cell whose numbers f32 does not tell.
     #[cold]
     pub(super) fn doubt(&mut self, i: usize, dark: f32) {
-        let at = self.found.place(i);
         for l in self.found.pixels(i) {
-            if self.flaws[at + l] == Flaw::None && self.light[3][at + l] > dark {
-                self.flaws[at + l] = Flaw::Coarse;
-            }
+            self.doubt_pixel(i, l, dark);
+        }
+    }
+
+    /// As [`Self::doubt`], of pixel `l` of the block.
+    pub(super) fn doubt_pixel(&mut self, i: usize, l: usize, dark: f32) {
+        let at = self.found.place(i) + l;
+        if self.flaws[at] == Flaw::None && self.light[3][at] > dark {
+            self.flaws[at] = Flaw::Coarse;
         }
     }
 
@@ -294,8 +303,13 @@ impl<const N: usize> Canvas<N> {
                         (v as f32).max(r.span[n][0]).min(r.span[n][1])
                     })
                 };
-                let length = ((leave - enter) * lens.length(column, row)) as f32;
-                self.gather(scene.blend, integral, at, &value(enter), &value(leave), length);
+                let length = (leave - enter) * lens.length(column, row);
+                if let Some(two) = &integral.second {
+                    let ends = [value(enter), value(leave)].map(|v| v.map(f64::from));
+                    self.gather_two(scene, two, at, ends, [enter, length]);
+                } else {
+                    self.gather(scene.blend, integral, at, &value(enter), &value(leave), length as f32);
+                }
                 self.fragments += 1;
                 let is_doubtful = scene.blend == Blend::Maximum && self.light_at(at)[3] > r.dark;
                 if is_doubtful && self.flaws[at] == Flaw::None {

@@ -1,12 +1,10 @@
 //! The vectors of the sweep, and what pieces of rays emit and absorb in them: the equations are those of [`crate::integral`].
 
+pub(super) use crate::integral::floats::{Floats, LANES};
+use crate::integral::floats::{exp, series};
 use crate::integral::{GAUSS_6, MILD, PANEL, Piece};
+use fearless_simd::Simd;
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x16, u32x16};
-
-/// As wide as the widest instructions: others do it in parts, with the same result.
-pub(super) const LANES: usize = 16;
-pub(super) type Floats<S> = f32x16<S>;
 
 /// Optical depth up to which the shorter series holds.
 pub(super) const FAINT: f32 = 1.0 / 8.0;
@@ -49,16 +47,6 @@ fn faint<S: Simd>(simd: S, x: Floats<S>, y: Floats<S>) -> [Floats<S>; 3] {
     let alpha = scaled.mul_add(even, scaled);
     let back = e * rise.mul_add(bent, q + even);
     [alpha, alpha - back, back]
-}
-
-/// c₀ + c₁ x + c₂ x² + …
-#[inline(always)]
-fn series<S: Simd, const K: usize>(simd: S, x: Floats<S>, c: &[f32; K]) -> Floats<S> {
-    let mut sum = Floats::splat(simd, c[K - 1]);
-    for k in (0..K - 1).rev() {
-        sum = x.mul_add(sum, Floats::splat(simd, c[k]));
-    }
-    sum
 }
 
 /// Up to a depth of 1: `Piece::mild`.
@@ -121,26 +109,6 @@ fn deeper<S: Simd>(
         (all[0][l], all[1][l], all[2][l]) = (piece.alpha, piece.front, piece.back);
     }
     all.map(|v| Floats::from_slice(simd, &v))
-}
-
-/// eˣ for x ≤ 0: `real::exp`.
-#[inline(always)]
-#[allow(clippy::excessive_precision, reason = "ln 2 in two parts: the first is exact in f32")]
-fn exp<S: Simd>(simd: S, x: Floats<S>) -> Floats<S> {
-    const ROUND: f32 = 12_582_912.0;
-    let of = |v: f32| Floats::splat(simd, v);
-    let clamped = x.max(of(-87.0));
-    let shifted = clamped * std::f32::consts::LOG2_E + ROUND;
-    let k = shifted - ROUND;
-    let r = (clamped - k * 0.693_359_375) - k * -2.121_944_4e-4;
-    let mut p = of(1.0 / 5040.0);
-    for c in [1.0 / 720.0, 1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5, 1.0, 1.0] {
-        p = p * r + of(c);
-    }
-    let bits: u32x16<S> = shifted.bitcast();
-    let biased = bits - u32x16::splat(simd, ROUND.to_bits() - 127);
-    let scale: Floats<S> = (biased << 23).bitcast();
-    x.simd_lt(of(-87.0)).select(of(0.0), p * scale)
 }
 
 #[cfg(test)]

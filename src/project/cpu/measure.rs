@@ -73,6 +73,10 @@ impl<const N: usize> Canvas<N> {
     /// Adds what the fragments found emit and absorb.
     #[inline(always)]
     pub(super) fn measure<S: Simd>(&mut self, simd: S, scene: &Scene<N>, integral: &Integral, records: &Records<N>) {
+        // Other numbers of values have no second variable, nor its code.
+        if let (2 | 5, Some(two)) = (N, &integral.second) {
+            return self.measure_two(simd, scene, two, records);
+        }
         if N == 1 && integral.table.is_none() && scene.blend == Blend::Composite {
             self.find_values(simd, records);
             return self.add_scalars(simd, scene, integral.exact, records);
@@ -97,7 +101,7 @@ impl<const N: usize> Canvas<N> {
 
     /// Depths beyond R's at which the fragments of the `i`-th block begin and end, and their lengths.
     #[inline(always)]
-    fn span<S: Simd>(&self, simd: S, r: &Record<N>, i: usize) -> [Floats<S>; 3] {
+    pub(super) fn span<S: Simd>(&self, simd: S, r: &Record<N>, i: usize) -> [Floats<S>; 3] {
         let load = |v: &[f32; LANES]| Floats::load_array_ref(simd, v);
         let one = Floats::splat(simd, 1.0);
         let (enter, leave) = (load(&self.found.enter[i]), load(&self.found.leave[i]));

@@ -103,21 +103,8 @@ impl<const N: usize> Segments<N> for Two<'_> {
 
     #[inline(always)]
     fn add(&mut self, front: &[f64; N], back: &[f64; N], [from, to]: [f64; 2], light: &mut Light<f32>) {
-        if front.iter().chain(back).all(|v| v.is_finite()) {
-            let [values, ends] = [front, back].map(|v| self.second.own([v[0], v[1]]));
-            let vector = |v: &[f64; N]| match v[..] {
-                [_, _, x, y, z] => DVec3::new(x, y, z),
-                _ => DVec3::ZERO,
-            };
-            let segment = Segment {
-                at: values,
-                rise: [ends[0] - values[0], ends[1] - values[1]],
-                vector: vector(front),
-                turn: vector(back) - vector(front),
-                place: self.origin + self.along * from,
-                along: self.along,
-                length: to - from,
-            };
+        let place = self.origin + self.along * from;
+        if let Some(segment) = Segment::new(self.second, front, back, place, self.along, to - from) {
             self.second.add(&segment, &mut self.scratch, light);
         }
     }
