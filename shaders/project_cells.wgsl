@@ -90,7 +90,8 @@ fn line_at(low: f32, high: f32) -> u32 {
     return select(i, u32(ends.z), low == high && low == ends.x && ends.z != 0.0);
 }
 
-/// A key that falls as the depth rises; HIDDEN if nothing of the cell is seen. As `keys.rs` finds them on the host.
+/// A key that falls as the depth rises, and ends with one less than the number of parts that the cell is drawn in; HIDDEN if
+/// nothing of the cell is seen.
 fn key_of(cell: u32) -> u32 {
     let corners = cells(cell);
     let v = values_of(cell, corners);
@@ -98,7 +99,7 @@ fn key_of(cell: u32) -> u32 {
         return HIDDEN;
     }
     let s = vec4f(last_of(v[0]), last_of(v[1]), last_of(v[2]), last_of(v[3]));
-    if !shows(min(min(s.x, s.y), min(s.z, s.w)), max(max(s.x, s.y), max(s.z, s.w))) {
+    if !SHOWS_ALL && !shows(least_of(s), greatest_of(s)) {
         return HIDDEN;
     }
     let p = solid_of(corners).p;
@@ -143,8 +144,10 @@ fn key_of(cell: u32) -> u32 {
     }
     let bits = bitcast<u32>(depth);
     let ascending = select(bits | 0x80000000u, ~bits, (bits >> 31u) == 1u);
-    // No finite depth gives HIDDEN.
-    return ~ascending;
+    // Forms that interpolate draw what is left of a cell around the eye as up to three tetrahedra. No finite depth gives
+    // HIDDEN.
+    let parts = select(1u, 3u, FORM != INTERSECTED && any(w < vec4f(frame.nearest)));
+    return (~ascending & ~(MOST_PARTS - 1u)) | (parts - 1u);
 }
 
 @compute @workgroup_size(64)

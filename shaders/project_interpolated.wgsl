@@ -9,7 +9,7 @@
 // 0    the middle of a pixel at the thickest point, and the depths between which rays are seen (t in a parallel view);
 // 1–2  the stretch of rays around it; and the longest edge;
 // 3    the rank, and which plane of a cylindrical table holds the thickest point;
-// then the lines of the function.
+// then the line of the function that the least value is on.
 // The values: the least and the greatest.
 
 /// To pixels from the upper left corner of the image.
@@ -185,5 +185,5 @@ fn write_record(i: u32, whole: Solid, values: array<Value, 4>, piece: u32, rank:
     words[1] = vec4f(stretch[0], longest);
     words[2] = vec4f(stretch[1], 0.0);
     words[3] = vec4f(f32(rank & 0xffffffu), plane, 0.0, 0.0);
-    store(i, words, vec4f(), last_of(low), last_of(high), 0.0, 0u, Values(low, high));
+    store(i, words, vec4f(), last_of(low), last_of(high), Values(low, high));
 }

@@ -42,7 +42,5 @@ fn fragment(drawn: Drawn) -> Fragment {
     let rise = back - front;
     back = select(front + rise * (end / length), back, end == length);
     front = select(front + rise * (start / length), front, start == 0.0);
-    // Lines count values from the cell's least.
-    let least = select(Value(), values[0], COLORING == EXACT && LINES > 0u);
-    return fragment_of(front - least, back - least, end - start, words, at, u32(words[3].x));
+    return fragment_of(front, back, end - start, words, at, u32(words[3].x));
 }

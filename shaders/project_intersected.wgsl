@@ -2,13 +2,13 @@
 
 // The words of a record:
 // 0–2  the cell's facets, counted from the middle of a pixel amid it;
-// 3    that middle, how far it is from the least value to the greatest, and bits: which facets are entered, and, of 16,
-//      whether the last is the reference that the others count from;
+// 3    that middle, nothing, and bits: which facets are entered, and, of 16, whether the last is the reference that the
+//      others count from;
 // 4–5  the stretch of rays around it, times the cell's depth; and the longest edge;
 // then, where anything cuts rays off or is dithered, the nearnesses between which they are seen, the cell's depth (t in a
-// parallel view) and the rank; and the lines of the function.
+// parallel view) and the rank; and the line of the function that the least value is on.
 // The values: in the middle; how it rises from pixel to pixel to the right and down, and towards the eye; the least and
-// the greatest. If they are COUNTED, from the least.
+// the greatest.
 
 /// To pixels from the upper left corner of the image.
 fn pixel_of(p: vec3f) -> vec2f {
@@ -181,6 +181,7 @@ fn ending_with(last: u32) -> vec4u {
     return select(halves, halves.yxwz, (last & 1u) == 0u);
 }
 
+/// A cell is drawn as a whole: there is no `piece` but the first.
 fn write_record(i: u32, solid: Solid, own_values: array<Value, 4>, piece: u32, rank: u32) {
     let p = solid.p;
     var around: array<vec2f, 4>;
@@ -261,7 +262,7 @@ fn write_record(i: u32, solid: Solid, own_values: array<Value, 4>, piece: u32, r
     let low = min(min(v[0], v[1]), min(v[2], v[3]));
     let high = max(max(v[0], v[1]), max(v[2], v[3]));
     let rises = array<Value, 3>(v[1] - v[0], v[2] - v[0], v[3] - v[0]);
-    var middle = v[0] - select(Value(), low, COUNTED);
+    var middle = v[0];
     var to_right: Value;
     var to_below: Value;
     var towards_eye: Value;
@@ -311,7 +312,7 @@ fn write_record(i: u32, solid: Solid, own_values: array<Value, 4>, piece: u32, r
     if !(abs(volume) > FLAT) {
         around = array<vec2f, 4>(vec2f(-9.0), vec2f(-9.0), vec2f(-9.0), vec2f(-9.0));
     }
-    words[3] = vec4f(centre, last_of(high) - last_of(low), f32(bits.x | bits.y | bits.z | bits.w | select(0u, 16u, is_measured)));
+    words[3] = vec4f(centre, 0.0, f32(bits.x | bits.y | bits.z | bits.w | select(0u, 16u, is_measured)));
     let stretch = stretch_around(way.high, depth);
     words[4] = vec4f(stretch[0], longest);
     words[5] = vec4f(stretch[1], 0.0);
@@ -320,9 +321,7 @@ fn write_record(i: u32, solid: Solid, own_values: array<Value, 4>, piece: u32, r
         limits = depth / max(vec2f(frame.near, frame.far) + frame.forward.w, vec2f(AT_EYE)) - 1.0;
     }
     let rare = vec4f(limits, select(t, depth, PERSPECTIVE), f32(rank & 0xffffffu));
-    // In a parallel view the eye is beyond all values.
-    let eye = select(FAR * last_of(towards_eye), last_of(low) + last_of(middle + towards_eye), PERSPECTIVE);
-    store(i, words, rare, last_of(low), last_of(high), eye, piece, Values(middle, to_right, to_below, towards_eye, low, high));
+    store(i, words, rare, last_of(low), last_of(high), Values(middle, to_right, to_below, towards_eye, low, high));
     records[i].vertices[0].corner = around[0];
     records[i].vertices[1].corner = around[1];
     records[i].vertices[2].corner = around[2];

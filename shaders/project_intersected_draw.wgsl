@@ -34,7 +34,6 @@ fn nearness_at(t: vec2f, stretch: f32, depth: f32) -> vec2f {
     return select(depth - along, depth / max(along + frame.forward.w, vec2f(AT_EYE)) - 1.0, PERSPECTIVE);
 }
 
-/// Reads no uniforms unless something cuts rays off: in software each takes as long as a look-up.
 @fragment
 fn fragment(drawn: Drawn) -> Fragment {
     let words = words_of(drawn);

@@ -1,7 +1,7 @@
 // The lines of the transfer function, and the exact integral by those that a segment is on, looked up one by one.
 
 /// The lines of the function, LINES_ACROSS in a row: below each other value, slope, and the two ends with the number of the
-/// line of a single value. An image, as drivers in software look buffers up lane by lane, and sample slowly.
+/// line of a single value.
 @group(0) @binding(10) var lines: texture_storage_2d<rgba32float, read>;
 
 /// A line of the function, and between which values it is that.

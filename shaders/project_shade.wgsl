@@ -12,7 +12,7 @@ fn most_work() -> u32 {
     return MOST_WORK;
 }
 
-/// Premultiplied colour and opacity of a segment of a cell; with LINES, values count from its least.
+/// Premultiplied colour and opacity of a segment of a cell.
 fn colored(front: Value, back: Value, length: f32, words: Words) -> vec4f {
     work = 0u;
     if COLORING == EXACT {

@@ -81,6 +81,16 @@ pub struct Description {
     pub lacks: Option<String>,
 }
 
+impl Description {
+    /// Whether it is a driver in software, which draws on the CPU.
+    pub fn is_software(&self) -> bool {
+        self.kind == SOFTWARE
+    }
+}
+
+/// The kind of drivers in software.
+const SOFTWARE: &str = "CPU";
+
 /// Features without which an adapter is of no use: none beyond compute shaders and [`LIMITS`].
 const REQUIRED: wgpu::Features = wgpu::Features::empty();
 
@@ -112,7 +122,7 @@ fn describe(index: usize, adapter: &wgpu::Adapter) -> Description {
         wgpu::DeviceType::DiscreteGpu => "discrete GPU",
         wgpu::DeviceType::IntegratedGpu => "integrated GPU",
         wgpu::DeviceType::VirtualGpu => "virtual GPU",
-        wgpu::DeviceType::Cpu => "CPU",
+        wgpu::DeviceType::Cpu => SOFTWARE,
         wgpu::DeviceType::Other => "other",
     };
     let (limits, missing) = (adapter.limits(), REQUIRED - adapter.features());
@@ -188,7 +198,7 @@ impl Gpu {
         let all: Vec<_> = adapters().into_iter().enumerate().map(|(i, a)| (describe(i, &a), a)).collect();
         let known = all.iter().map(|(d, _)| format!("{} ({})", d.index, d.name)).collect::<Vec<_>>().join(", ");
         let found = all.into_iter().find(|(d, _)| match &name {
-            None => d.kind != "CPU" && d.lacks.is_none(),
+            None => !d.is_software() && d.lacks.is_none(),
             Some(n) => match n.parse::<usize>() {
                 Ok(index) => d.index == index,
                 Err(_) => d.name.to_ascii_lowercase().contains(n) || (!d.uuid.is_empty() && d.uuid == *n),
@@ -243,7 +253,7 @@ impl Gpu {
         }));
         device.set_device_lost_callback(move |reason, message| lost(Fault::Lost(format!("{reason:?}: {message}"))));
         // Half of the main memory for a device that is the CPU; real ones tell when they have no more.
-        let budget = if description.kind == "CPU" { main_memory() / 2 } else { u64::MAX };
+        let budget = if description.is_software() { main_memory() / 2 } else { u64::MAX };
         let limits = device.limits();
         Ok(Gpu {
             binding: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size),

@@ -155,8 +155,7 @@ pub(crate) struct Counts {
     pub(crate) cycle_cells: u64,
     pub(crate) cuts: u64,
     pub(crate) overlapping: u64,
-    /// By the device's own clock, where it has one, or in software the host's: projecting all cells of the order, and
-    /// drawing them.
+    /// By the device's own clock, where it has one: projecting all cells of the order, and drawing them.
     pub(crate) project_ms: Option<f64>,
     pub(crate) draw_ms: Option<f64>,
     /// Fragments that were computed, where the device counts them.

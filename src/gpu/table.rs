@@ -141,7 +141,7 @@ fn no_slabs() -> Error {
 /// Whether `gpu` is to build the tables of `choice` itself, rather than be handed them.
 pub(crate) fn builds(gpu: &Gpu, choice: &Choice) -> bool {
     let wanted = match choice.build {
-        Build::Auto => gpu.adapter.kind != "CPU",
+        Build::Auto => !gpu.adapter.is_software(),
         Build::Host => false,
         Build::Device => true,
     };

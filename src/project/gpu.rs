@@ -1,13 +1,12 @@
 //! The engine on a device: what it holds, and the passes of a frame.
 //!
-//! 1. `classify` (compute) finds the cells that are seen, and a key of depth for each; for devices in software the host
-//!    does.
-//! 2. These are put in order: that of the mesh, which the host finds, or by the keys.
+//! 1. `classify` (compute) finds the cells that are seen, and a key of depth for each.
+//! 2. These are put in order: by the keys, which the device sorts where it can; or that of the mesh, which the host finds.
 //! 3. Batch by batch, in that order, `project` (compute) makes a record of each cell, and the records are drawn.
 
+mod circumsphere;
 mod drawing;
 mod frame;
-mod keys;
 mod lines;
 mod ordering;
 mod program;
@@ -15,6 +14,7 @@ mod record;
 
 use super::{Counts, Fragments, Order, Switches, Target};
 use crate::error::{Error, Result};
+use crate::field::Kind;
 use crate::geometry::{Geometry, Values};
 use crate::gpu::buffers::{Buffer, Chunks};
 use crate::gpu::raster::{self, Slot, Texture};
@@ -27,8 +27,6 @@ use crate::view::{Blend, View};
 use bytemuck::{Pod, Zeroable};
 use drawing::Canvas;
 use frame::Seen;
-use keys::Parts;
-use lines::{Extent, Lines};
 use ordering::{Ordered, Sequenced, Sequencing};
 use program::{Drawn, Program, program};
 use record::Layout;
@@ -58,7 +56,6 @@ struct HeldFunction {
     buffers: [Buffer; 3],
     lines: Texture,
     bins: Buffer,
-    ends: Vec<lines::End>,
 }
 
 /// A device, and what of the mesh, field and function it holds.
@@ -69,7 +66,6 @@ pub(crate) struct Project {
     cells: Option<Chunks>,
     points: Option<Chunks>,
     values: Option<Chunks>,
-    extent: Option<Extent>,
     function: Option<HeldFunction>,
     /// What is known of the order of the mesh, and the last one.
     mpvo: Mpvo,
@@ -80,7 +76,7 @@ pub(crate) struct Project {
     ordered: Option<Ordered>,
     table: table::Held,
     sorter: Option<Sorter>,
-    /// Whether the device sorts, and not the host.
+    /// Whether the device sorts where it can; tests have the host do it.
     sorts: bool,
     /// Entries of one buffer of an order that the host finds, a multiple of [`BATCH`].
     order_chunk: usize,
@@ -115,7 +111,6 @@ impl Project {
             }
         };
         use Slot::{Read, Uniform, Write};
-        let sorts = gpu.adapter.kind != "CPU";
         let shared = raster::layout(
             &gpu,
             Stages::COMPUTE | Stages::VERTEX_FRAGMENT,
@@ -129,7 +124,6 @@ impl Project {
             cells: None,
             points: None,
             values: None,
-            extent: None,
             function: None,
             mpvo: Mpvo::default(),
             sequence: None,
@@ -138,7 +132,7 @@ impl Project {
             ordered: None,
             table: table::Held::default(),
             sorter: None,
-            sorts,
+            sorts: true,
             order_chunk: BATCH << 6,
         })
     }
@@ -147,11 +141,10 @@ impl Project {
         &self.gpu
     }
 
-    /// Sorts on the device or on the host from now on, whatever suits it.
+    /// Sorts on the device, where it can, or on the host from now on.
     #[cfg(test)]
     pub(crate) fn sort_on_device(&mut self, sorts: bool) {
         (self.sorts, self.ordered) = (sorts, None);
-        self.programs.clear();
     }
 
     /// Keeps so many entries of an order in one buffer from now on.
@@ -176,9 +169,6 @@ impl Project {
     /// Takes `part` for changed.
     pub(crate) fn forget(&mut self, part: Part) {
         self.ordered = None;
-        if part != Part::Function {
-            self.extent = None;
-        }
         if matches!(part, Part::Mesh | Part::Points) {
             (self.mpvo, self.sequence) = (Mpvo::default(), None);
         }
@@ -213,15 +203,11 @@ impl Project {
         let gpu = &self.gpu;
         let function = match self.function.take() {
             Some(function) => function,
-            None => {
-                let ends = lines::bins(exact);
-                HeldFunction {
-                    buffers: function::upload(gpu, exact)?,
-                    lines: lines::image(gpu, exact)?,
-                    bins: Buffer::holding(gpu, "bins", &ends, Usage::STORAGE)?,
-                    ends,
-                }
-            }
+            None => HeldFunction {
+                buffers: function::upload(gpu, exact)?,
+                lines: lines::image(gpu, exact)?,
+                bins: Buffer::holding(gpu, "bins", &lines::bins(exact), Usage::STORAGE)?,
+            },
         };
         self.table.prepare(gpu, table, &self.function.insert(function).buffers)
     }
@@ -246,25 +232,16 @@ impl Project {
         let table = table.filter(|_| !is_maximum);
         self.upload(geometry, values)?;
         self.prepare_table(exact, table)?;
-        let extent = *self.extent.get_or_insert_with(|| Extent::new(geometry, values));
         let association = arrays::association(values);
         let arrays = self.arrays()?;
         let seen = Seen::new(geometry, view);
         let is_rare = switches.fragments == Fragments::Intersected && (switches.dithers() || seen.limits().any());
-        let lines = match table {
-            Some(_) => Lines::None,
-            None if is_maximum => Lines::None,
-            // Devices that sort draw cells in one part; they do not mind look-ups.
-            None if self.sorts => Lines::looked_up(exact.kind),
-            None => Lines::new(exact, extent, switches.fragments == Fragments::Intersected),
-        };
-        let layout = Layout::new(switches.fragments, exact.kind.components(), lines, is_rare);
+        let has_line = table.is_none() && !is_maximum && exact.kind != Kind::Pair;
+        let layout = Layout::new(switches.fragments, exact.kind.components(), has_line, is_rare);
         let variant = Variant { kind: exact.kind, direct: exact.direct };
         let mut limits = seen.limits();
         // In parallel views all segments of a cell are on one plane.
         let one_plane = table.is_some_and(|t| t.choice().per_cell) || view.eye().is_none();
-        // Processors do 4 × 4 pixels, graphics cards 2 × 2.
-        limits.block = if self.sorts { 2 } else { 4 };
         limits.plane_per_cell = one_plane && switches.fragments != Fragments::Intersected;
         let drawn = Drawn { switches, blend: view.blend() };
         let source = program(&variant, association, drawn, &layout, table.map(|t| &**t), limits, &arrays);
@@ -279,14 +256,15 @@ impl Project {
             _ => Order::Depth,
         };
         let mut counts = Counts { order: by, ..Counts::default() };
-        let asked = Sequencing { by, parts: Parts::new(switches, lines), all: is_maximum };
+        let splits = switches.fragments != Fragments::Intersected && view.eye().is_some();
+        let asked = Sequencing { by, splits, all: is_maximum };
         if !self.ordered.as_ref().is_some_and(|o| o.holds_for(&seen, asked)) {
             let start = Instant::now();
             self.ordered = None;
             if let Some(rule) = by.rule() {
                 self.find_sequence(geometry, view, &seen, rule);
             }
-            self.ordered = Some(self.order(&frame, &seen, geometry, values, asked)?);
+            self.ordered = Some(self.order(&frame, &seen, geometry, asked)?);
             counts.sorts = 1;
             counts.order_ms = start.elapsed().as_secs_f64() * 1e3;
         }

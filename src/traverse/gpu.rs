@@ -299,7 +299,7 @@ impl Traverse {
             leaves: geometry.boundary.boxes().len().div_ceil(2) as u32,
             faces: geometry.boundary.faces.len() as u32,
             most_steps: geometry.cells.len() as u32,
-            most_work: if gpu.adapter.kind == "CPU" { LLVMPIPE_WORK } else { u32::MAX },
+            most_work: if gpu.adapter.is_software() { LLVMPIPE_WORK } else { u32::MAX },
         };
         let rows = (RAYS / u64::from(w)).clamp(1, u64::from(h)) as u32;
         let size = u64::from(w) * u64::from(rows) * 16;

@@ -89,7 +89,7 @@ fn devices_look_up_as_f64_does() {
                 let worst = worst(&table, &segments, &got);
                 // Filters of real devices round their weights to 8 bits; llvmpipe's of 8-bit texels round what they
                 // mix, too.
-                let bound = match (gpu.adapter.kind == "CPU", texels) {
+                let bound = match (gpu.adapter.is_software(), texels) {
                     (_, Texels::Unorm8) => 5e-2,
                     (true, _) => 2e-5,
                     (false, _) => 5e-3,
@@ -133,7 +133,7 @@ fn devices_look_up_what_they_built() {
             }
             let got = looked_up_in(&gpu, (&table, &on_device.unwrap()), direct, &segments);
             let worst = worst(&Lookup::new(&exact, &choice, 2.0).unwrap(), &segments, &got);
-            let bound = if gpu.adapter.kind == "CPU" { 1e-4 } else { 5e-3 };
+            let bound = if gpu.adapter.is_software() { 1e-4 } else { 5e-3 };
             assert!(worst < bound, "{choice:?}, {emission:?}: {worst}");
             built += 1;
         }

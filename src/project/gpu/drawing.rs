@@ -9,7 +9,6 @@ use crate::gpu::raster::{self, Readback, Texture};
 use crate::gpu::rays::FAR;
 use crate::project::Counts;
 use crate::view::View;
-use std::time::Instant;
 use wgpu::{BufferUsages as Usage, TextureUsages};
 
 /// Batches that are handed over at once: a driver ends work that takes seconds.
@@ -90,10 +89,6 @@ impl Project {
 
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         self.clear(&mut encoder, canvas);
-        // Devices in software tell no times of their parts: the host waits for each, which costs them nothing.
-        let is_software = gpu.adapter.kind == "CPU";
-        let (mut project_ms, mut since) = (0.0, Instant::now());
-        let begun = since;
         for (i, &first) in firsts.iter().enumerate() {
             let count = (ordered.entries - first).min(BATCH);
             let slice = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
@@ -114,12 +109,6 @@ impl Project {
                 pass.set_bind_group(1, &frame.arrays, &[]);
                 pass.set_bind_group(2, &own, &[]);
                 pass.dispatch_workgroups(groups[0], groups[1], 1);
-            }
-            if is_software {
-                gpu.queue.submit([encoder.finish()]);
-                gpu.wait()?;
-                project_ms += since.elapsed().as_secs_f64() * 1e3;
-                encoder = gpu.device.create_command_encoder(&Default::default());
             }
             {
                 let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -145,18 +134,10 @@ impl Project {
                     pass.end_pipeline_statistics_query();
                 }
             }
-            if is_software || (i + 1) % AT_ONCE == 0 {
+            if (i + 1) % AT_ONCE == 0 {
                 gpu.queue.submit([encoder.finish()]);
                 encoder = gpu.device.create_command_encoder(&Default::default());
             }
-            if is_software {
-                gpu.wait()?;
-                since = Instant::now();
-            }
-        }
-        if is_software {
-            let all = begun.elapsed().as_secs_f64() * 1e3;
-            (counts.project_ms, counts.draw_ms) = (Some(project_ms), Some(all - project_ms));
         }
         let [w, h] = view.size();
         let row = row_bytes(w, format);
@@ -183,9 +164,7 @@ impl Project {
                 let period = f64::from(gpu.queue.get_timestamp_period()) / 1e6;
                 let sum =
                     |at: usize| times.chunks(4).map(|t| t[at + 1].saturating_sub(t[at])).sum::<u64>() as f64 * period;
-                if !is_software {
-                    (counts.project_ms, counts.draw_ms) = (Some(sum(0)), Some(sum(2)));
-                }
+                (counts.project_ms, counts.draw_ms) = (Some(sum(0)), Some(sum(2)));
             }
             picture.chunks(row as usize).flat_map(|line| pixels(&line[..w as usize * texel(format)], format)).collect()
         })

@@ -4,7 +4,7 @@ use crate::geometry::Geometry;
 use crate::gpu::rays::{self, FAR};
 use crate::view::View;
 use bytemuck::{Pod, Zeroable};
-use glam::{DMat3, DVec3, Vec3, Vec4};
+use glam::{DMat3, DVec3};
 
 /// Up to this distance from the mesh's centre, in normalised units, rays start at the eye.
 const NEAR_EYE: f64 = 2.0;
@@ -38,23 +38,6 @@ pub(super) struct Frame {
     unused: [f32; 2],
 }
 
-impl Frame {
-    /// The place that coordinates are relative to.
-    pub(super) fn base(&self) -> DVec3 {
-        [self.base, self.base_low].map(|v| Vec4::from(v).truncate().as_dvec3()).into_iter().sum()
-    }
-
-    /// What a point is multiplied with for its place in the image, to the right and up, times its depth, and for that.
-    pub(super) fn axes(&self) -> [Vec3; 3] {
-        [self.across[0], self.across[1], self.forward].map(|v| Vec4::from(v).truncate())
-    }
-
-    /// The depth of the base in a perspective view.
-    pub(super) fn ahead(&self) -> f32 {
-        self.forward[3]
-    }
-}
-
 /// A view as the shaders see it.
 pub(super) struct Seen {
     pub(super) frame: Frame,
@@ -76,8 +59,6 @@ pub(super) struct Limits {
     pub(super) range: bool,
     /// Whether rays meet at the eye.
     pub(super) perspective: bool,
-    /// Pixels along a side of the blocks that the rasteriser does at once.
-    pub(super) block: u32,
     /// One pair of a table's planes serves all fragments of a cell.
     pub(super) plane_per_cell: bool,
 }
@@ -100,7 +81,6 @@ impl Seen {
             range: frame.near > near || frame.far < FAR,
             perspective: self.perspective,
             plane_per_cell: false,
-            block: 1,
         }
     }
 

@@ -11,8 +11,8 @@ use crate::gpu::rays::FAR;
 use crate::gpu::shader::{self, Array, Variant};
 use crate::gpu::table::{self, TABLE};
 use crate::integral::Lookup;
-use crate::order::PART;
 use crate::order::depth::HIDDEN;
+use crate::order::{MOST_PARTS, PART};
 use crate::project::{Compositing, Fragments, Switches, Thickness};
 use crate::view::Blend;
 use wgpu::ShaderStages as Stages;
@@ -58,6 +58,9 @@ pub(super) struct Drawn<'a> {
 /// Programs that are kept: edits of the function, and what cuts rays off, go to and fro between some.
 const KEPT: usize = 4;
 
+/// Pixels along a side of the blocks that rasterisers do at once.
+const BLOCK: f64 = 2.0;
+
 /// Loop iterations of a fragment that llvmpipe surely makes: see `traverse::gpu`.
 const MOST_WORK: u32 = 8000;
 
@@ -68,8 +71,7 @@ pub(super) struct Program {
     compositing: Compositing,
     pub(super) layout: Layout,
     pub(super) arrays: wgpu::BindGroupLayout,
-    /// On devices that sort.
-    pub(super) classify: Option<wgpu::ComputePipeline>,
+    pub(super) classify: wgpu::ComputePipeline,
     pub(super) project: wgpu::ComputePipeline,
     pub(super) draw: wgpu::RenderPipeline,
 }
@@ -107,7 +109,7 @@ impl Project {
         // The outline of an intersected cell may be no more than that: grown, it need not turn one way.
         let culled = (switches.fragments != Fragments::Intersected).then_some(wgpu::Face::Back);
         let program = Program {
-            classify: self.sorts.then(|| raster::compute(gpu, &module, "classify", &cells)),
+            classify: raster::compute(gpu, &module, "classify", &cells),
             project: raster::compute(gpu, &module, "project_all", &cells),
             draw: raster::render(
                 gpu,
@@ -143,7 +145,7 @@ pub(super) fn program(
 ) -> String {
     let mut text = shader::prelude(variant);
     // Twice the area of the blocks that a line of unit length passes, by its mean direction.
-    let doubled = 2.0 * f64::from(limits.block) * 4.0 / std::f64::consts::PI;
+    let doubled = 2.0 * BLOCK * 4.0 / std::f64::consts::PI;
     for (name, value) in
         [("FAR", f64::from(FAR)), ("GROWTH", f64::from(GROWTH)), ("BESIDE", 1e-18), ("DOUBLED", doubled)]
     {
@@ -162,11 +164,12 @@ pub(super) fn program(
         ("HAS_PLANES", limits.planes),
         ("IS_CLIPPED", limits.range),
         ("PERSPECTIVE", limits.perspective),
+        ("SHOWS_ALL", blend == Blend::Maximum),
     ] {
         text += &format!("const {name} = {value};\n");
     }
     text += &format!(
-        "const LINES_ACROSS = {LINES_ACROSS}u;\nconst HIDDEN = {HIDDEN}u;\nconst BINS = {BINS}u;\nconst PART = {PART}u;\nconst MOST_WORK = {MOST_WORK}u;\n\
+        "const LINES_ACROSS = {LINES_ACROSS}u;\nconst HIDDEN = {HIDDEN}u;\nconst BINS = {BINS}u;\nconst PART = {PART}u;\nconst MOST_PARTS = {MOST_PARTS}u;\nconst MOST_WORK = {MOST_WORK}u;\n\
          const INTERSECTED = 0u;\nconst INTERPOLATED = 1u;\nconst LINEAR = 2u;\nconst FORM = {form};\n\
          const POINT = 0u;\nconst CORNER = 1u;\nconst CELL = 2u;\nconst ASSOCIATION = {association};\n"
     );

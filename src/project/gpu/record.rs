@@ -6,16 +6,11 @@
 //! that nobody looks at. Vertex fetch is much faster than look-ups in a storage buffer where drivers do these lane by
 //! lane.
 
-use super::lines::Lines;
 use crate::project::Fragments;
 
-/// The words of a form before its lines, and how many values there are.
+/// The words of a form before the line of the function, and how many values there are.
 const INTERSECTED: (usize, usize) = (6, 6);
 const INTERPOLATED: (usize, usize) = (4, 2);
-
-/// Values of an intersected cell, but for the least and the greatest: where records hold lines, values count from the
-/// least, and the words tell how far to the greatest.
-const COUNTED: usize = 4;
 
 /// A float, two or four.
 fn type_of(floats: usize) -> &'static str {
@@ -35,17 +30,18 @@ pub(crate) struct Layout {
     share: usize,
     words_at: u64,
     components: usize,
-    lines: Lines,
-    /// The first word with lines, the first with values, and the number of values.
-    lines_at: usize,
+    /// Whether a word is the number of the line that the least value is on, from which fragments look up the function; where
+    /// that is or would be; the first word with values, and the number of values.
+    has_line: bool,
+    line_at: usize,
     values: (usize, usize),
-    /// Whether the last word before the lines is one that few pictures need.
+    /// Whether the last word before the line is one that few pictures need.
     rare: bool,
 }
 
 impl Layout {
     /// With one word more that few pictures need if `rare`.
-    pub(crate) fn new(form: Fragments, components: usize, lines: Lines, rare: bool) -> Self {
+    pub(crate) fn new(form: Fragments, components: usize, has_line: bool, rare: bool) -> Self {
         let is_intersected = form == Fragments::Intersected;
         let own = match is_intersected {
             true => vec![("corner", 2)],
@@ -56,9 +52,8 @@ impl Layout {
             false => (&[0, 1, 2, 0, 2, 3, 0, 3, 4, 0, 4, 1], INTERPOLATED),
         };
         let parts = triangles.iter().fold(0, |n, &i| n.max(i + 1));
-        let lines_at = words + usize::from(rare);
-        let count = if is_intersected && lines.are_all() { COUNTED } else { count };
-        let values = (lines_at + lines.words(), count);
+        let line_at = words + usize::from(rare);
+        let values = (line_at + usize::from(has_line), count);
         let words = values.0 + (count * components).div_ceil(4);
         let mut end = 0;
         let place = |(name, floats): (&'static str, usize)| {
@@ -70,7 +65,7 @@ impl Layout {
         let own: Vec<_> = own.into_iter().map(place).collect();
         let share = words.div_ceil(parts as usize);
         let words_at = end.next_multiple_of(16);
-        Layout { triangles, parts, own, words, share, words_at, components, lines, lines_at, values, rare }
+        Layout { triangles, parts, own, words, share, words_at, components, has_line, line_at, values, rare }
     }
 
     /// Bytes of a part, and of a record.
@@ -105,10 +100,10 @@ impl Layout {
         parts
     }
 
-    /// `Record` and `store`, which fills its words, with the function between two values; `Stored`, which is what a vertex
+    /// `integrated`, the exact integral of a segment; `Record` and `store`, which fills its words; `Stored`, which is what a vertex
     /// finds of it, and `Drawn`, which it hands on to fragments; and what fragments take out of that again.
     pub(crate) fn wgsl(&self) -> String {
-        let Layout { parts, words, share, lines_at, values: (first, count), components, .. } = *self;
+        let Layout { parts, words, share, has_line, line_at, values: (first, count), components, .. } = *self;
         let own = |each: &dyn Fn(usize, &str) -> String, skipped: usize| {
             let own = self.own.iter().enumerate().skip(skipped);
             own.map(|(i, (name, floats, _))| each(i, &format!("{name}: {}, ", type_of(*floats)))).collect::<String>()
@@ -116,7 +111,7 @@ impl Layout {
         let each = |of: &dyn Fn(usize) -> String| (0..words).map(of).collect::<String>();
         let at = self.own.len();
 
-        let usual = lines_at - usize::from(self.rare);
+        let usual = line_at - usize::from(self.rare);
 
         // Values are packed tightly into words.
         let float = |i: usize| format!("[{}].{}", i / 4, ["x", "y", "z", "w"][i % 4]);
@@ -126,10 +121,8 @@ impl Layout {
             _ => format!("v[{}].{}", i / components, ["x", "y", "z", "w"][i % components]),
         };
         let word = |i: usize| match i.checked_sub(first) {
-            None if i >= lines_at && self.lines.are_all() => format!("lines.words[{}]", i - lines_at),
-            None if i >= lines_at => format!("lines[{}]", i - lines_at),
+            None if i >= line_at => "vec4f(f32(line_at(low, high)), 0.0, 0.0, 0.0)".into(),
             None if i >= usual => "rare".into(),
-            None if i + 1 == usual && self.lines.are_all() => format!("vec4f(words[{i}].xyz, lines.pieces)"),
             None => format!("words[{i}]"),
             Some(k) => format!("vec4f({})", (4 * k..4 * k + 4).map(packed).collect::<Vec<_>>().join(", ")),
         };
@@ -138,26 +131,24 @@ impl Layout {
             let floats: Vec<_> = floats.map(|f| format!("words{}", float(4 * first + f))).collect();
             format!("Value({})", floats.join(", "))
         };
-        let mut values: Vec<_> = (0..count).map(value).collect();
-        let counts = count == COUNTED;
-        if counts {
-            values.extend(["0.0".into(), "words[3].z".into()]);
-        }
-        let lines = match self.lines {
-            Lines::None => "",
-            _ => "let lines = lines_between(low, high, eye, piece); ",
+        let values: Vec<_> = (0..count).map(value).collect();
+        let integral = match has_line {
+            true => format!("return by_lookups(front, back, length, u32(words[{line_at}].x));"),
+            false => "light = vec4f(0.0, 0.0, 0.0, 1.0);
+                add_segment(front, back, length);
+                return vec4f(light.xyz, 1.0 - light.w);"
+                .into(),
         };
 
         [
-            self.lines.wgsl(lines_at, self.rare),
             format!("alias Words = array<vec4f, {words}>;"),
             format!("alias Values = array<Value, {}>;", values.len()),
-            format!("const COUNTED = {counts};"),
+            format!("fn integrated(front: Value, back: Value, length: f32, words: Words) -> vec4f {{\n{integral}\n}}"),
             format!("struct Vertex {{ {}words: array<vec4f, {share}> }}", own(&|_, field| field.into(), 0)),
             format!("struct Record {{ vertices: array<Vertex, {parts}> }}"),
             format!(
-                "fn store(i: u32, words: array<vec4f, {usual}>, rare: vec4f, low: f32, high: f32, eye: f32, piece: u32, v: Values)
-                {{ {lines}{}}}",
+                "fn store(i: u32, words: array<vec4f, {usual}>, rare: vec4f, low: f32, high: f32, v: Values)
+                {{ {}}}",
                 each(&|w| format!("records[i].vertices[{}].words[{}] = {}; ", w / share, w % share, word(w)))
             ),
             format!(
