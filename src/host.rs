@@ -129,10 +129,9 @@ impl Session {
     /// # Errors
     /// [`Error::Render`] if no order is called so, or the distance is negative or not finite.
     pub fn set_reconstruction(&mut self, order: &str, distance: f64) -> Result<()> {
-        let named = Order::ALL.into_iter().find(|(name, _)| *name == order || order.is_empty());
-        let Some((_, order)) = named else {
-            let known = Order::ALL.map(|(name, _)| name).join(", ");
-            return Err(Error::Render(format!("no reconstruction is called \"{order}\"; there is {known}")));
+        let order = match order {
+            "" => Order::Exact,
+            name => name.parse().map_err(|e| Error::Render(format!("reconstruction: {e}")))?,
         };
         if !(distance >= 0.0 && distance.is_finite()) {
             return Err(Error::Render(format!(

@@ -252,13 +252,13 @@ impl Builder {
         ];
         let texels = Buffer::new(gpu, "texels", bytes[0], Usage::STORAGE | Usage::COPY_SRC)?;
         let result = Buffer::new(gpu, "result", bytes[1], Usage::STORAGE | Usage::COPY_SRC)?;
-        let shared = raster::group(gpu, &self.layouts[0], function.iter().map(|b| b.raw.as_entire_binding()));
+        let shared = raster::group_of(gpu, &self.layouts[0], function);
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let mut jobs = vec![];
         for (pipeline, job, [x, y, z]) in &plan.dispatches {
             let job = Buffer::holding(gpu, "job", &[Job { pitch, ..*job }], Usage::UNIFORM)?;
             let all = std::iter::once(&job).chain(&uploaded).chain([&texels, &result]);
-            let group = raster::group(gpu, &self.layouts[1], all.map(|b| b.raw.as_entire_binding()));
+            let group = raster::group_of(gpu, &self.layouts[1], all);
             let mut pass = encoder.begin_compute_pass(&Default::default());
             pass.set_pipeline(&self.pipelines[*pipeline]);
             pass.set_bind_group(0, &shared, &[]);

@@ -184,6 +184,15 @@ pub(crate) fn group<'a>(
     gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries })
 }
 
+/// A group of whole buffers, bound from 0 on.
+pub(crate) fn group_of<'a>(
+    gpu: &Gpu,
+    layout: &wgpu::BindGroupLayout,
+    buffers: impl IntoIterator<Item = &'a Buffer>,
+) -> wgpu::BindGroup {
+    group(gpu, layout, buffers.into_iter().map(|b| b.raw.as_entire_binding()))
+}
+
 pub(crate) fn pipeline_layout(gpu: &Gpu, layouts: &[Option<&wgpu::BindGroupLayout>]) -> wgpu::PipelineLayout {
     gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: None,

@@ -1,6 +1,5 @@
 //! Shader assembly: fragments of WGSL joined into programs, after a prelude of what Rust knows.
 
-use super::Gpu;
 use crate::field::Kind;
 use crate::integral::{BUCKETS, DEEP, MILD, OPAQUE_EXTINCTION};
 use std::fmt::Write;
@@ -82,77 +81,4 @@ pub(crate) fn accessors(arrays: &[Array]) -> String {
         }
     }
     text
-}
-
-/// Compiles a program whose entry point is "main".
-pub(crate) fn compile(
-    gpu: &Gpu,
-    label: &str,
-    source: &str,
-    layouts: &[&wgpu::BindGroupLayout],
-) -> wgpu::ComputePipeline {
-    let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some(label),
-        source: wgpu::ShaderSource::Wgsl(source.into()),
-    });
-    let layouts: Vec<_> = layouts.iter().map(|l| Some(*l)).collect();
-    let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some(label),
-        bind_group_layouts: &layouts,
-        immediate_size: 0,
-    });
-    gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: Some(label),
-        layout: Some(&layout),
-        module: &module,
-        entry_point: Some("main"),
-        compilation_options: wgpu::PipelineCompilationOptions {
-            zero_initialize_workgroup_memory: false,
-            ..Default::default()
-        },
-        cache: None,
-    })
-}
-
-/// What one binding of a compute shader is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Binding {
-    Uniform,
-    Read,
-    Write,
-}
-
-/// The layout of a group whose bindings are numbered from 0.
-pub(crate) fn group_layout(gpu: &Gpu, bindings: &[Binding]) -> wgpu::BindGroupLayout {
-    let entries: Vec<_> = (0..)
-        .zip(bindings)
-        .map(|(binding, kind)| wgpu::BindGroupLayoutEntry {
-            binding,
-            visibility: wgpu::ShaderStages::COMPUTE,
-            ty: wgpu::BindingType::Buffer {
-                ty: match kind {
-                    Binding::Uniform => wgpu::BufferBindingType::Uniform,
-                    Binding::Read => wgpu::BufferBindingType::Storage { read_only: true },
-                    Binding::Write => wgpu::BufferBindingType::Storage { read_only: false },
-                },
-                has_dynamic_offset: false,
-                min_binding_size: None,
-            },
-            count: None,
-        })
-        .collect();
-    gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &entries })
-}
-
-/// A group of whole buffers, bound from 0 on.
-pub(crate) fn group<'a>(
-    gpu: &Gpu,
-    layout: &wgpu::BindGroupLayout,
-    buffers: impl IntoIterator<Item = &'a super::buffers::Buffer>,
-) -> wgpu::BindGroup {
-    let entries: Vec<_> = (0..)
-        .zip(buffers)
-        .map(|(binding, b)| wgpu::BindGroupEntry { binding, resource: b.raw.as_entire_binding() })
-        .collect();
-    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries })
 }

@@ -81,7 +81,7 @@ impl Sorter {
             let (from, to) = ([keys, &numbers], [&other_keys, &other_numbers]);
             let (from, to) = if p % 2 == 0 { (from, to) } else { (to, from) };
             let all = [pass, from[0], from[1], to[0], to[1], &counts, &total];
-            let group = raster::group(gpu, &self.layout, all.into_iter().map(|b| b.raw.as_entire_binding()));
+            let group = raster::group_of(gpu, &self.layout, all);
             for (k, pipeline) in self.pipelines.iter().enumerate() {
                 let mut pass = encoder.begin_compute_pass(&Default::default());
                 pass.set_pipeline(pipeline);

@@ -37,6 +37,9 @@ use wgpu::{BufferUsages as Usage, ShaderStages as Stages};
 /// Records of one batch.
 const BATCH: usize = 1 << 17;
 
+/// The arrays that the compute stages read, and what WGSL calls their elements.
+const ARRAYS: [(&str, &str); 3] = [("cells", "vec4u"), ("points", "Point"), ("values", "Value")];
+
 /// Invocations of a compute group, and groups along one axis at most.
 const GROUP: u32 = 64;
 const MOST_GROUPS: u32 = 65_535;
@@ -153,17 +156,10 @@ impl Project {
         (self.order_chunk, self.ordered) = (entries, None);
     }
 
-    /// Has each binding of an array hold so many bytes at most from now on.
+    /// The device, whose limits tests lower.
     #[cfg(test)]
-    pub(crate) fn bind_at_most(&mut self, bytes: u64) {
-        self.gpu.binding = bytes;
-        self.forget(Part::Mesh);
-    }
-
-    /// How many bindings cells, points and values have.
-    #[cfg(test)]
-    pub(crate) fn bindings(&self) -> Vec<usize> {
-        self.chunks().map_or(vec![], |all| all.iter().map(|c| c.buffers.len()).collect())
+    pub(crate) fn gpu_mut(&mut self) -> &mut Gpu {
+        &mut self.gpu
     }
 
     /// Takes `part` for changed.
@@ -299,15 +295,10 @@ impl Project {
 
     /// The arrays of group 1 of the compute stages, in the order of [`Self::chunks`].
     fn arrays(&self) -> Result<[Array; 3]> {
-        let names = [("cells", "vec4u"), ("points", "Point"), ("values", "Value")];
-        let chunks = self.chunks()?;
-        Ok(std::array::from_fn(|i| {
-            let (name, element) = names[i];
-            Array { name, element, chunks: chunks[i].buffers.len(), shift: chunks[i].shift }
-        }))
+        Ok(arrays::named(ARRAYS, self.chunks()?))
     }
 
-    fn chunks(&self) -> Result<[&Chunks; 3]> {
+    pub(crate) fn chunks(&self) -> Result<[&Chunks; 3]> {
         match (&self.cells, &self.points, &self.values) {
             (Some(cells), Some(points), Some(values)) => Ok([cells, points, values]),
             _ => Err(Error::Render("the device does not hold the mesh".into())),
@@ -350,10 +341,10 @@ impl Pass {
         ];
         let shared = function.iter().chain(&buffers).map(|b| b.raw.as_entire_binding()).chain(table.bindings());
         let shared = shared.chain([wgpu::BindingResource::TextureView(&lines.view)]);
-        let arrays = project.chunks()?.into_iter().flat_map(|c| &c.buffers).map(|b| b.raw.as_entire_binding());
+        let arrays = project.chunks()?.into_iter().flat_map(|c| &c.buffers);
         Ok(Pass {
             shared: raster::group(gpu, &project.shared, shared),
-            arrays: raster::group(gpu, &program.arrays, arrays),
+            arrays: raster::group_of(gpu, &program.arrays, arrays),
             bins: bins.raw.clone(),
             _buffers: buffers,
         })

@@ -6,8 +6,9 @@ use crate::geometry::boundary::{BoundaryFace, LEAF};
 use crate::geometry::{Cell, Geometry, Values};
 use crate::gpu::buffers::{Buffer, Chunks};
 use crate::gpu::function;
+use crate::gpu::raster::Slot;
 use crate::gpu::rays::{self, FAR};
-use crate::gpu::shader::{self, Array, Binding, Variant};
+use crate::gpu::shader::{self, Array, Variant};
 use crate::gpu::table::{self, TABLE};
 use crate::gpu::{Gpu, Part, arrays, raster};
 use crate::integral::{Exact, Lookup};
@@ -18,7 +19,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
-use wgpu::BufferUsages as Usage;
+use wgpu::{BufferUsages as Usage, ShaderStages as Stages};
 
 const TRAVERSE: &str = include_str!("../../shaders/traverse.wgsl");
 
@@ -137,9 +138,9 @@ pub(crate) struct Traverse {
 
 impl Traverse {
     pub(crate) fn new(gpu: Gpu) -> Self {
-        use Binding::{Read, Uniform, Write};
-        let layout = shader::group_layout(&gpu, &[Uniform, Read, Read, Uniform, Read, Read, Write, Write]);
-        let tables = raster::layout(&gpu, wgpu::ShaderStages::COMPUTE, &table::SLOTS);
+        use Slot::{Read, Uniform, Write};
+        let own = [Uniform, Read, Read, Uniform, Read, Read, Write, Write];
+        let [layout, tables] = [&own[..], &table::SLOTS[..]].map(|slots| raster::layout(&gpu, Stages::COMPUTE, slots));
         let table = table::Held::default();
         Traverse { gpu, layout, cells: None, points: None, values: None, function: None, program: None, tables, table }
     }
@@ -148,17 +149,10 @@ impl Traverse {
         &self.gpu
     }
 
-    /// Has each binding of an array hold so many bytes at most from now on.
+    /// The device, whose limits tests lower.
     #[cfg(test)]
-    pub(crate) fn bind_at_most(&mut self, bytes: u64) {
-        self.gpu.binding = bytes;
-        self.forget(Part::Mesh);
-    }
-
-    /// How many bindings the arrays of the mesh have, in the order of [`Self::chunks`].
-    #[cfg(test)]
-    pub(crate) fn bindings(&self) -> Vec<usize> {
-        self.chunks().map_or(vec![], |all| all.iter().map(|c| c.buffers.len()).collect())
+    pub(crate) fn gpu_mut(&mut self) -> &mut Gpu {
+        &mut self.gpu
     }
 
     /// Takes `part` for changed.
@@ -235,13 +229,13 @@ impl Traverse {
         let source = program(&variant, association, view.blend(), table.map(|t| &**t), &arrays);
         if self.program.as_ref().is_none_or(|p| p.0 != source) {
             let bindings = arrays.iter().map(|a| a.chunks).sum();
-            let layout = shader::group_layout(&self.gpu, &vec![Binding::Read; bindings]);
-            let pipeline = {
-                let tables = table.is_some().then_some(&self.tables);
-                let layouts: Vec<_> = [&self.layout, &layout].into_iter().chain(tables).collect();
-                shader::compile(&self.gpu, "traverse", &source, &layouts)
-            };
-            self.gpu.check()?;
+            let gpu = &self.gpu;
+            let layout = raster::layout(gpu, Stages::COMPUTE, &vec![Slot::Read; bindings]);
+            let tables = table.is_some().then_some(Some(&self.tables));
+            let layouts: Vec<_> = [Some(&self.layout), Some(&layout)].into_iter().chain(tables).collect();
+            let module = raster::module(gpu, "traverse", &source);
+            let pipeline = raster::compute(gpu, &module, "main", &raster::pipeline_layout(gpu, &layouts));
+            gpu.check()?;
             self.program = Some((source, pipeline, layout));
         }
         self.draw(geometry, table.is_some(), view)
@@ -261,14 +255,10 @@ impl Traverse {
 
     /// The arrays of group 1, in the order of [`Self::chunks`].
     fn arrays(&self) -> Result<[Array; 6]> {
-        let chunks = self.chunks()?;
-        Ok(std::array::from_fn(|i| {
-            let (name, element) = ARRAYS[i];
-            Array { name, element, chunks: chunks[i].buffers.len(), shift: chunks[i].shift }
-        }))
+        Ok(arrays::named(ARRAYS, self.chunks()?))
     }
 
-    fn chunks(&self) -> Result<[&Chunks; 6]> {
+    pub(crate) fn chunks(&self) -> Result<[&Chunks; 6]> {
         match (&self.cells, &self.points, &self.values) {
             (Some([cells, faces]), Some([points, volumes, boxes]), Some(values)) => {
                 Ok([cells, faces, points, volumes, boxes, values])
@@ -311,8 +301,8 @@ impl Traverse {
         let back = Buffer::new(gpu, "readback", size + 32, Usage::COPY_DST | Usage::MAP_READ)?;
         let [parameters, knots, buckets] = function;
         let own = [parameters, knots, buckets, &frame_buffer, &planes, &ends, &pixels, &counts];
-        let own = shader::group(gpu, &self.layout, own);
-        let shared = shader::group(gpu, group_layout, self.chunks()?.into_iter().flat_map(|c| &c.buffers));
+        let own = raster::group_of(gpu, &self.layout, own);
+        let shared = raster::group_of(gpu, group_layout, self.chunks()?.into_iter().flat_map(|c| &c.buffers));
         let tables = self.table.get().filter(|_| tabulated);
         let tables = tables.map(|t| raster::group(gpu, &self.tables, t.bindings()));
         let clock = Clock::new(gpu)?;

@@ -181,13 +181,6 @@ pub(crate) fn opacity(text: &str) -> Result<Opacity, String> {
     text.split(',').map(knot).collect::<Result<_, String>>().map(Opacity)
 }
 
-/// An order of reconstruction, by its name.
-pub(crate) fn order(text: &str) -> Result<halite::cast::Order, String> {
-    let all = halite::cast::Order::ALL;
-    let found = all.iter().find(|(name, _)| *name == text).map(|(_, order)| *order);
-    found.ok_or_else(|| format!("there is {}", all.map(|(name, _)| name).join(", ")))
-}
-
 /// Where samples are taken along rays.
 pub(crate) fn sampling(text: &str) -> Result<halite::cast::Sampling, String> {
     if text == "voxels" {

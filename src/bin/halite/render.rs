@@ -59,7 +59,7 @@ pub(crate) struct Request {
     pub(crate) size: Option<[u32; 2]>,
     /// What stands for the field of a regular or rectilinear grid between samples: itself, parabolas, lines, or rectangles
     /// by the middle, the left or the right sample [default: exact]
-    #[arg(long, value_name = "ORDER", value_parser = parse::order)]
+    #[arg(long, value_name = "ORDER")]
     reconstruction: Option<Order>,
     /// Where such samples are: at faces of voxels and midway, or so many world units apart [default: voxels]
     #[arg(long, value_name = "voxels|LENGTH", value_parser = parse::sampling)]

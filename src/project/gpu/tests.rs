@@ -3,7 +3,7 @@
 use super::*;
 use crate::field::{Association, Component, Field, Kind};
 use crate::gpu::raster::Readback;
-use crate::gpu::testing::{gpu, validated};
+use crate::gpu::testing::{bindings, gpu, validated};
 use crate::integral::lookup::tests::{choices, exact};
 use crate::mesh::{cells::Tetrahedra, generate};
 use crate::order::MOST_PARTS;
@@ -17,8 +17,7 @@ use glam::{DVec3, dvec3};
 use wgpu::naga;
 
 fn arrays(chunks: usize) -> Vec<Array> {
-    let names = [("cells", "vec4u"), ("points", "Point"), ("values", "Value")];
-    names.map(|(name, element)| Array { name, element, chunks, shift: 22 }).to_vec()
+    ARRAYS.map(|(name, element)| Array { name, element, chunks, shift: 22 }).to_vec()
 }
 
 const KINDS: [Kind; 3] = [Kind::Scalar, Kind::Pair, Kind::Rgba];
@@ -214,20 +213,24 @@ fn orders_of_several_buffers_are_one() {
         let one = renderer.render(&view, &|_| ()).unwrap();
         let project = renderer.backend().project().unwrap();
         let whole = project.gpu().binding;
-        assert_eq!(project.bindings(), [1; 3]);
+        assert_eq!(bindings(project.chunks()), [1; 3]);
         project.sort_on_device(false);
         project.keep_in_chunks_of(BATCH);
         let several = renderer.render(&view, &|_| ()).unwrap();
         assert!(renderer.stats().projection.unwrap().drawn_cells > BATCH as u64);
         assert!(several.compare(&one).unwrap().max < 2e-6, "{order:?}");
-        renderer.backend().project().unwrap().bind_at_most(512 << 10);
+        let project = renderer.backend().project().unwrap();
+        project.gpu_mut().binding = 512 << 10;
+        project.forget(Part::Mesh);
         let spread = renderer.render(&view, &|_| ()).unwrap();
         let project = renderer.backend().project().unwrap();
-        assert!(project.bindings()[0] > 4 && project.bindings()[1] > 1, "{:?}", project.bindings());
+        let arrays = bindings(project.chunks());
+        assert!(arrays[0] > 4 && arrays[1] > 1, "{arrays:?}");
         // A fragment is the same wherever its cell comes from.
         assert!(spread == several, "{order:?}: {:e}", spread.compare(&several).unwrap().max);
         project.keep_in_chunks_of(BATCH << 6);
-        project.bind_at_most(whole);
+        project.gpu_mut().binding = whole;
+        project.forget(Part::Mesh);
     }
 }
 
@@ -287,7 +290,7 @@ fn ten_million_tetrahedra_are_drawn() {
     project.set_transfer(&everything);
     traverse.set_transfer(&everything);
     let (got, want) = (project.render(&view, &|_| ()).unwrap(), traverse.render(&view, &|_| ()).unwrap());
-    let bindings: usize = project.backend().project().unwrap().bindings().iter().sum();
+    let bindings: usize = bindings(project.backend().project().unwrap().chunks()).iter().sum();
     let drawn = project.stats().projection.unwrap().drawn_cells;
     let error = got.compare(&want).unwrap();
     eprintln!("{bindings} bindings, {drawn} cells, error {:e}, {:?}", error.max, project.stats());

@@ -56,19 +56,20 @@ fn layouts_match_their_rust_twins() {
 }
 
 /// Runs a kernel over `cases`, whose bindings are 0 and, for as many results, 1 of group 1.
-fn run<C: Pod, R: Pod>(gpu: &Gpu, source: &str, group_0: &[(Binding, &Buffer)], cases: &[C]) -> Vec<R> {
+fn run<C: Pod, R: Pod>(gpu: &Gpu, source: &str, group_0: &[(Slot, &Buffer)], cases: &[C]) -> Vec<R> {
     let layouts = [
-        shader::group_layout(gpu, &group_0.iter().map(|g| g.0).collect::<Vec<_>>()),
-        shader::group_layout(gpu, &[Binding::Read, Binding::Write]),
+        raster::layout(gpu, Stages::COMPUTE, &group_0.iter().map(|g| g.0).collect::<Vec<_>>()),
+        raster::layout(gpu, Stages::COMPUTE, &[Slot::Read, Slot::Write]),
     ];
-    let pipeline = shader::compile(gpu, "test", source, &[&layouts[0], &layouts[1]]);
+    let layout = raster::pipeline_layout(gpu, &layouts.each_ref().map(Some));
+    let pipeline = raster::compute(gpu, &raster::module(gpu, "test", source), "main", &layout);
     let size = (cases.len() * size_of::<R>()) as u64;
     let cases_buffer = Buffer::holding(gpu, "cases", cases, Usage::STORAGE).unwrap();
     let results = Buffer::new(gpu, "results", size, Usage::STORAGE | Usage::COPY_SRC).unwrap();
     let back = Buffer::new(gpu, "back", size, Usage::COPY_DST | Usage::MAP_READ).unwrap();
     let groups = [
-        shader::group(gpu, &layouts[0], group_0.iter().map(|g| g.1)),
-        shader::group(gpu, &layouts[1], [&cases_buffer, &results]),
+        raster::group_of(gpu, &layouts[0], group_0.iter().map(|g| g.1)),
+        raster::group_of(gpu, &layouts[1], [&cases_buffer, &results]),
     ];
     let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     {
@@ -308,7 +309,7 @@ fn segments_are_integrated_as_in_f64() {
         let convert = format!("fn value_of(v: vec4f) -> Value {{ return {value}; }}");
         let source = [&shader::prelude(&variant), &convert, shader::INTEGRAL, INTEGRAL_TEST].join("\n");
         let [function, knots, buckets] = function::upload(&gpu, &fast).unwrap();
-        let group = [(Binding::Uniform, &function), (Binding::Read, &knots), (Binding::Read, &buckets)];
+        let group = [(Slot::Uniform, &function), (Slot::Read, &knots), (Slot::Read, &buckets)];
         let outcomes: Vec<[f32; 4]> = run(&gpu, &source, &group, &cases);
         for ([front, back, length], got) in cases.iter().zip(&outcomes) {
             let want = add(&slow, kind, front, back, length[0]);
