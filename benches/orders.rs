@@ -4,11 +4,7 @@
 //! Convex meshes, and any by shared faces alone, need no edges of the boundary; those with holes and parts need them. The device draws
 //! its cells in this order; what a frame takes besides is reported by `halite bench --engine project --views 8`: `order_ms` in its JSON.
 
-#![allow(
-    clippy::expect_used,
-    clippy::print_stdout,
-    reason = "a benchmark prints, and has nothing to tell if it cannot start"
-)]
+#![allow(clippy::expect_used, clippy::print_stdout, reason = "tests fail by panicking")]
 
 use glam::{DVec3, dvec3};
 use halite::geometry::Geometry;

@@ -2,11 +2,7 @@
 //! with `tiles` or `sorts` after that, one of them. Graphics cards of 2002 and whatever draws here are no match; what
 //! one form takes beside another is.
 
-#![allow(
-    clippy::expect_used,
-    clippy::print_stdout,
-    reason = "a benchmark prints, and has nothing to tell if it cannot start"
-)]
+#![allow(clippy::expect_used, clippy::print_stdout, reason = "tests fail by panicking")]
 
 use glam::DVec3;
 use halite::field::{Association, Component, Field};

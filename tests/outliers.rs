@@ -1,13 +1,7 @@
 //! Values that are far from all others, as fill values are, and functions whose knots are far nearer to each other than
 //! values are: what such do to a picture is what the reference says, and nothing else.
 
-#![allow(
-    clippy::expect_used,
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::print_stderr,
-    reason = "a test fails by panicking, and tells what it measured"
-)]
+#![allow(clippy::expect_used, clippy::unwrap_used, clippy::panic, clippy::print_stderr, reason = "tests")]
 
 mod common;
 

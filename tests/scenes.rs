@@ -1,13 +1,7 @@
 //! The scenes of `../shared/reference`, whose images another program drew in f64: where that folder is not, the meshes
 //! of the other tests stand alone.
 
-#![allow(
-    clippy::expect_used,
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::print_stderr,
-    reason = "a test fails by panicking"
-)]
+#![allow(clippy::expect_used, clippy::unwrap_used, clippy::panic, clippy::print_stderr, reason = "tests")]
 
 mod common;
 

@@ -1,12 +1,7 @@
 //! Tables in both engines: pictures by each form against the exact ones, and against the oracle's where its scenes are
 //! there.
 
-#![allow(
-    clippy::expect_used,
-    clippy::unwrap_used,
-    clippy::print_stderr,
-    reason = "a test fails by panicking, and tells what it measured"
-)]
+#![allow(clippy::expect_used, clippy::unwrap_used, clippy::print_stderr, reason = "tests fail by panicking")]
 
 mod common;
 

@@ -1,13 +1,7 @@
 //! What the tests of the engines share: the engines, scenes to draw, and a report that shows what differs.
 
 #![allow(dead_code, reason = "each test uses a part")]
-#![allow(
-    clippy::expect_used,
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::print_stderr,
-    reason = "a test fails by panicking, and tells what it measured"
-)]
+#![allow(clippy::expect_used, clippy::unwrap_used, clippy::panic, clippy::print_stderr, reason = "tests")]
 
 pub(crate) mod draw;
 pub(crate) mod shared;
