@@ -9,7 +9,7 @@
 
 #![allow(clippy::expect_used, clippy::print_stdout, reason = "a benchmark that cannot start has nothing to tell")]
 
-use halite::field::{Kind as FieldKind, Normal};
+use halite::field::{Kind as FieldKind, Normalization};
 use halite::gpu::DeviceChoice;
 use halite::gpu::construct::{Construction, Constructor};
 use halite::integral::Exact;
@@ -19,7 +19,7 @@ use halite::transfer::TransferFunction;
 use rayon::prelude::*;
 use std::time::Instant;
 
-const NORMAL: [Normal; 4] = [Normal { mid: 0.0, half: 1.0 }; 4];
+const NORMAL: [Normalization; 4] = [Normalization { mid: 0.0, half: 1.0 }; 4];
 
 /// Lengths of segments reach this far; extinctions are up to 4.
 const LONGEST: f64 = 2.0;

@@ -5,7 +5,7 @@
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec3;
-use halite::field::{Component, Field, Kind, Normal};
+use halite::field::{Component, Field, Kind, Normalization};
 use halite::geometry::Geometry;
 use halite::gpu::{self, DeviceChoice};
 use halite::integral::{Exact, Light};
@@ -80,7 +80,7 @@ fn before_drawing(c: &mut Criterion) {
 }
 
 fn integral(c: &mut Criterion) {
-    let normal = [Normal { mid: 0.0, half: 1.0 }; 4];
+    let normal = [Normalization { mid: 0.0, half: 1.0 }; 4];
     let mut group = c.benchmark_group("integral");
     for convention in [Convention::Extinction, Convention::Opacity] {
         let transfer = transfer(convention);

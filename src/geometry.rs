@@ -7,7 +7,7 @@ pub mod boundary;
 pub mod contacts;
 
 use crate::error::{Error, Result};
-use crate::field::normal::{self, Normal};
+use crate::field::normalization::{self, Normalization};
 use crate::field::{Association, Field};
 use crate::mesh::cells::Tetrahedra;
 use crate::mesh::faces::{BOUNDARY, Faces};
@@ -239,7 +239,7 @@ impl<const N: usize> Values<N> {
         points: usize,
         cells: usize,
         field: &Field,
-        normal: &[Normal; 4],
+        normal: &[Normalization; 4],
     ) -> Result<Self> {
         let (what, count) = match field.association() {
             Association::Point => ("points", points),
@@ -249,7 +249,7 @@ impl<const N: usize> Values<N> {
             return Err(Error::Field(format!("the field has {} values for {count} {what}", field.len() / N)));
         }
         let limits: [f64; N] =
-            std::array::from_fn(|k| if N == 4 && k < 3 { normal::MOST_COLOUR } else { normal::MOST });
+            std::array::from_fn(|k| if N == 4 && k < 3 { normalization::MOST_COLOUR } else { normalization::MOST });
         let brought = |value: &dyn Fn(usize) -> f64| std::array::from_fn(|k| normal[k].bounded(value(k), limits[k]));
         if field.association() == Association::Cell {
             return Ok(Self::of_cells(geometry, tetrahedra, |c| brought(&|k| field.value(c * N + k))));

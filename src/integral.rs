@@ -30,7 +30,7 @@ pub use knots::Knots;
 pub(crate) use knots::Line;
 pub use lookup::{Integral, Lookup};
 
-use crate::field::{Kind, Normal};
+use crate::field::{Kind, Normalization};
 use crate::real::Real;
 use crate::transfer::{Emission, TransferFunction};
 use knots::{BRIGHTEST, Side, Track, compile, extinction, sample};
@@ -213,7 +213,7 @@ pub struct Exact<R> {
 impl<R: Real> Exact<R> {
     /// Prepares `transfer` for a field of `kind` whose components are mapped by `normal`, on a mesh whose coordinates
     /// were multiplied by `scale`.
-    pub fn new(transfer: &TransferFunction, kind: Kind, normal: &[Normal; 4], scale: f64) -> Self {
+    pub fn new(transfer: &TransferFunction, kind: Kind, normal: &[Normalization; 4], scale: f64) -> Self {
         let direct = matches!(transfer.emission(), Emission::Direct { .. });
         let emission = match transfer.emission() {
             Emission::Direct { scale: e } => (e / scale).min(BRIGHTEST),

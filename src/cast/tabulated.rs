@@ -2,7 +2,7 @@
 
 use super::reconstruction::Order;
 use crate::error::{Error, Result};
-use crate::field::Normal;
+use crate::field::Normalization;
 use crate::integral::{Exact, Form, Lookup};
 
 /// A table, and what makes its values of a field's.
@@ -50,7 +50,12 @@ pub(crate) fn check(form: Form, order: Order, even: bool) -> Result<()> {
 
 impl<'a> Tabulated<'a> {
     /// `lookup`, of the function `exact` over values that `of_table` maps, read with samples that `own` maps.
-    pub(crate) fn new(lookup: &'a Lookup, exact: &'a Exact<f64>, [own, of_table]: [Normal; 2], order: Order) -> Self {
+    pub(crate) fn new(
+        lookup: &'a Lookup,
+        exact: &'a Exact<f64>,
+        [own, of_table]: [Normalization; 2],
+        order: Order,
+    ) -> Self {
         let map = [own.half / of_table.half, (own.mid - of_table.mid) / of_table.half];
         Tabulated { lookup, map, exact, order }
     }

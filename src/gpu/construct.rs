@@ -8,7 +8,7 @@ use super::raster::{self, Readback, Slot};
 use super::shader::{self, Variant};
 use super::{DeviceChoice, Gpu, function};
 use crate::error::Result;
-use crate::field::{self, Normal};
+use crate::field::{self, Normalization};
 use crate::integral::lookup::Stored;
 use crate::integral::table::{
     Cylindrical, Kind, Nodes, OPAQUE_DEPTH, Polynomial, Sampling, Steps, THINNEST, Table, length,
@@ -298,7 +298,7 @@ impl Constructor {
     pub fn open(
         choice: &DeviceChoice,
         transfer: &TransferFunction,
-        normal: &[Normal; 4],
+        normal: &[Normalization; 4],
         scale: f64,
     ) -> Result<Option<Self>> {
         let Some(gpu) = Gpu::open(choice)? else { return Ok(None) };
@@ -383,7 +383,7 @@ mod tests {
     use crate::integral::table::tests::{apart_texels, transfers};
     use wgpu::naga;
 
-    const NORMAL: [Normal; 4] = [Normal { mid: 0.0, half: 1.0 }; 4];
+    const NORMAL: [Normalization; 4] = [Normalization { mid: 0.0, half: 1.0 }; 4];
 
     #[test]
     fn jobs_are_laid_out_as_the_shader_has_them() {

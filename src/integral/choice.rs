@@ -376,7 +376,7 @@ impl Choice {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field::{self, Normal};
+    use crate::field::{self, Normalization};
     use crate::transfer::{Emission, TransferFunction};
 
     #[test]
@@ -384,7 +384,7 @@ mod tests {
         let exact = |emission, extinction| {
             let transfer = TransferFunction::new(vec![(0.0, [0.5; 3])], vec![(-1.0, 0.0), (1.0, extinction)], 1.0);
             let transfer = transfer.unwrap().with_emission(emission).unwrap();
-            Exact::new(&transfer, field::Kind::Scalar, &[Normal { mid: 0.0, half: 1.0 }; 4], 1.0)
+            Exact::new(&transfer, field::Kind::Scalar, &[Normalization { mid: 0.0, half: 1.0 }; 4], 1.0)
         };
         let direct = Emission::Direct { scale: 1.0 };
         for (form, lengths, refused) in [

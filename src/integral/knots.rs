@@ -1,7 +1,7 @@
 //! The transfer function as the kernel reads it: knots over the normalised scalar.
 
 use super::OPAQUE_EXTINCTION;
-use crate::field::Normal;
+use crate::field::Normalization;
 use crate::real::Real;
 use crate::transfer::{Convention, OPAQUE, TransferFunction};
 
@@ -329,7 +329,7 @@ pub(super) fn sample<const N: usize>(knots: &[(f64, [f64; N])], clamp: bool, s: 
 /// The knots of `value` over the normalised scalar, at `places` in the field's own units; both limits at each.
 pub(super) fn compile<R: Real>(
     mut places: Vec<f64>,
-    normal: Normal,
+    normal: Normalization,
     value: impl Fn(f64, Side) -> [f64; 4],
 ) -> Knots<R> {
     places.sort_by(f64::total_cmp);

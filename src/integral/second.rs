@@ -27,7 +27,7 @@ mod special;
 
 use super::Light as Gathered;
 use super::choice::{Method, Two};
-use crate::field::Normal;
+use crate::field::Normalization;
 use crate::transfer::bivariate::{Shape, Source, Table, Wave, Widget};
 use crate::transfer::shading::{Light, Shading};
 use crate::transfer::{Bivariate, Convention, Emission, TransferFunction};
@@ -67,7 +67,7 @@ pub(crate) struct Second {
     /// Direct emission of a colour of 1 per normalised unit of length.
     direct: Option<f64>,
     /// What values are mapped by: of s and of g.
-    normal: [Normal; 2],
+    normal: [Normalization; 2],
     two: Two,
     /// Of segments in equal pieces.
     ends: Ends,
@@ -223,7 +223,13 @@ fn next_end(clips: &[Clip], u: f64) -> Option<f64> {
 impl Second {
     /// Prepares `transfer` for values mapped by `normal`, those of s and of g, and gradients of a length up to 1, on a
     /// mesh whose coordinates were made (world − `centre`) · `scale`.
-    pub(crate) fn new(transfer: &TransferFunction, normal: [Normal; 2], centre: DVec3, scale: f64, two: Two) -> Self {
+    pub(crate) fn new(
+        transfer: &TransferFunction,
+        normal: [Normalization; 2],
+        centre: DVec3,
+        scale: f64,
+        two: Two,
+    ) -> Self {
         let source = match transfer.bivariate().map(Bivariate::source) {
             Some(Source::Widgets(widgets)) => {
                 let bounded = |w: &Widget| Bounded::new(w, transfer, LONGEST / scale);

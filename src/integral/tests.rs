@@ -63,7 +63,7 @@ fn limits_are_finite() {
 }
 
 fn exact<R: Real>(transfer: &TransferFunction, kind: Kind) -> Exact<R> {
-    Exact::new(transfer, kind, &[Normal { mid: 0.0, half: 1.0 }; 4], 1.0)
+    Exact::new(transfer, kind, &[Normalization { mid: 0.0, half: 1.0 }; 4], 1.0)
 }
 
 fn tent() -> TransferFunction {

@@ -8,8 +8,8 @@ use super::{Progress, Renderer, ms};
 use crate::cast::tabulated::{self, Tabulated};
 use crate::cast::{self, Order, Reconstruction, Samples, Sampling, Volume};
 use crate::error::{Error, Result};
-use crate::field::normal::Chooser;
-use crate::field::{Field, Kind, Normal};
+use crate::field::normalization::Chooser;
+use crate::field::{Field, Kind, Normalization};
 use crate::gpu::Part;
 use crate::grid::Grid;
 use crate::image::Image;
@@ -31,7 +31,7 @@ pub(super) struct LoadedGrid {
 #[derive(Debug)]
 struct OnGrid {
     field: Field,
-    normal: [Normal; 4],
+    normal: [Normalization; 4],
     samples: Samples,
     /// How values are mapped for tables.
     chooser: Chooser,

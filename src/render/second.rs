@@ -4,8 +4,8 @@
 use super::{Drawn, Loaded, Progress, Renderer, Stats, missing, ms};
 use crate::error::{Error, Result};
 use crate::field::gradient::length;
-use crate::field::normal::MOST;
-use crate::field::{Association, Field, Gradient, Kind, Normal};
+use crate::field::normalization::MOST;
+use crate::field::{Association, Field, Gradient, Kind, Normalization};
 use crate::geometry::{Geometry, Values};
 use crate::image::Image;
 use crate::integral::choice::{Culling, Two};
@@ -43,7 +43,7 @@ pub(super) struct Seen {
 /// Values, and how they are mapped: s and g.
 #[derive(Debug)]
 struct Ready {
-    normal: [Normal; 2],
+    normal: [Normalization; 2],
     values: TwoOrFive,
 }
 
@@ -152,16 +152,17 @@ impl Extra {
         let short = [field.is_short(), field.second().is_some_and(Field::is_short)];
         let normal = [0, 1].map(|k| {
             let [lo, hi] = [ranges[k][0].max(wanted[k][0]), ranges[k][1].min(wanted[k][1])];
-            let normal = if lo <= hi { Normal::new(lo, hi) } else { Normal::new(ranges[k][0], ranges[k][1]) };
+            let normal =
+                if lo <= hi { Normalization::new(lo, hi) } else { Normalization::new(ranges[k][0], ranges[k][1]) };
             // What f32 holds as it is, a power of two does not round.
             if short[k] {
-                Normal { mid: 0.0, half: (normal.mid.abs() + normal.half).log2().ceil().exp2() }
+                Normalization { mid: 0.0, half: (normal.mid.abs() + normal.half).log2().ceil().exp2() }
             } else {
                 normal
             }
         });
         let good = |ready: &Ready| {
-            let close = |old: Normal, new: Normal| {
+            let close = |old: Normalization, new: Normalization| {
                 old.half <= BETTER * new.half && (old.mid - new.mid).abs() + new.half <= old.half * (1.0 + 1e-9)
             };
             matches!(ready.values, TwoOrFive::Five(_)) == lit && (0..2).all(|k| close(ready.normal[k], normal[k]))
@@ -186,7 +187,7 @@ impl Extra {
     }
 
     /// The values in the order of the mesh.
-    fn gather(&self, mesh: &Loaded, field: &Field, normal: [Normal; 2], lit: bool) -> TwoOrFive {
+    fn gather(&self, mesh: &Loaded, field: &Field, normal: [Normalization; 2], lit: bool) -> TwoOrFive {
         let (geometry, tetrahedra) = (&mesh.geometry, &mesh.tetrahedra);
         let scale = geometry.scale;
         let vector = |p: u32| self.gradient.as_ref().map(|g| g.vectors()[p as usize]).unwrap_or_default();

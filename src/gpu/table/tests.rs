@@ -113,7 +113,7 @@ fn devices_look_up_what_they_built() {
         let narrow = Exact::<f32>::new(
             &transfer(emission),
             field::Kind::Scalar,
-            &[field::Normal { mid: 0.0, half: 1.0 }; 4],
+            &[field::Normalization { mid: 0.0, half: 1.0 }; 4],
             1.0,
         );
         let function = crate::gpu::function::upload(&gpu, &narrow).unwrap();

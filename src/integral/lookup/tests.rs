@@ -1,10 +1,10 @@
 #![allow(clippy::unwrap_used, clippy::print_stderr, reason = "tests")]
 
 use super::*;
-use crate::field::Normal;
+use crate::field::Normalization;
 use crate::transfer::{Convention, Emission, TransferFunction};
 
-const UNIT: [Normal; 4] = [Normal { mid: 0.0, half: 1.0 }; 4];
+const UNIT: [Normalization; 4] = [Normalization { mid: 0.0, half: 1.0 }; 4];
 
 /// Ramps and a peak.
 pub(crate) fn transfer(emission: Emission) -> TransferFunction {

@@ -29,7 +29,7 @@ fn segment(front: [f64; 2], back: [f64; 2], length: f64) -> Segment {
 }
 
 fn prepared(transfer: &TransferFunction, two: Two) -> Second {
-    Second::new(transfer, [Normal { mid: 0.0, half: 1.0 }; 2], DVec3::ZERO, 1.0, two)
+    Second::new(transfer, [Normalization { mid: 0.0, half: 1.0 }; 2], DVec3::ZERO, 1.0, two)
 }
 
 /// As [`segment_of_two`], by what engines do, and in how many panels.

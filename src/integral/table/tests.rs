@@ -4,14 +4,14 @@ mod weights;
 
 use super::cylindrical::{coordinates, place};
 use super::*;
-use crate::field::Normal;
+use crate::field::Normalization;
 use crate::transfer::{Convention, Emission, TransferFunction};
 use rayon::prelude::*;
 
 fn exact(opacity: &[(f64, f64)], emission: Emission) -> Exact<f64> {
     let color = vec![(-1.0, [1.0, 0.2, 0.0]), (0.3, [0.0, 0.5, 0.9]), (1.0, [0.4, 0.4, 0.4])];
     let transfer = TransferFunction::new(color, opacity.to_vec(), 1.0).unwrap().with_emission(emission).unwrap();
-    Exact::new(&transfer, field::Kind::Scalar, &[Normal { mid: 0.0, half: 1.0 }; 4], 1.0)
+    Exact::new(&transfer, field::Kind::Scalar, &[Normalization { mid: 0.0, half: 1.0 }; 4], 1.0)
 }
 
 #[test]
@@ -122,7 +122,7 @@ fn planes_stand_for_a_volume() {
     let opacity = (-128..=128).map(|i| (at(i), 1.0 + (2.0 * at(i)).sin())).collect();
     let color = (-128..=128).map(|i| (at(i), [0.5 + 0.5 * at(i), (1.5 * at(i)).cos(), 0.3])).collect();
     let transfer = TransferFunction::new(color, opacity, 1.0).unwrap();
-    let smooth = Exact::new(&transfer, field::Kind::Scalar, &[Normal { mid: 0.0, half: 1.0 }; 4], 1.0);
+    let smooth = Exact::new(&transfer, field::Kind::Scalar, &[Normalization { mid: 0.0, half: 1.0 }; 4], 1.0);
     let mut last = f64::INFINITY;
     for n in [16, 32, 64] {
         let volume = Table::new(&smooth, Kind::Uniform, [n; 3], 2.0).unwrap();
@@ -183,7 +183,7 @@ fn limits_are_finite() {
     let color = vec![(-1.0, [1.0, 0.2, 0.0]), (1.0, [0.4, 0.4, 0.4])];
     let opacity = vec![(-1.0, 0.0), (-0.2, 1.0), (0.2, 1.0), (0.5, 0.0), (1.0, 0.0)];
     let opaque = TransferFunction::new(color, opacity, 1.0).unwrap().with_convention(Convention::Opacity);
-    let opaque = Exact::new(&opaque, field::Kind::Scalar, &[Normal { mid: 0.0, half: 1.0 }; 4], 1.0);
+    let opaque = Exact::new(&opaque, field::Kind::Scalar, &[Normalization { mid: 0.0, half: 1.0 }; 4], 1.0);
     for (exact, longest) in [(&peak, 1.0), (&opaque, 1.0), (&opaque, 1e-6), (&opaque, 1e6), (&peak, 1e-30)] {
         for kind in [Kind::Uniform, Kind::Log, Kind::LogNormalised] {
             let size = [17, 17, 12];
@@ -207,7 +207,8 @@ fn functions() -> Vec<(&'static str, Exact<f64>)> {
 }
 
 fn functions_of(seed: u64) -> Vec<(&'static str, Exact<f64>)> {
-    let exact = |t: &TransferFunction| Exact::new(t, field::Kind::Scalar, &[Normal { mid: 0.0, half: 1.0 }; 4], 1.0);
+    let exact =
+        |t: &TransferFunction| Exact::new(t, field::Kind::Scalar, &[Normalization { mid: 0.0, half: 1.0 }; 4], 1.0);
     transfers(seed).iter().map(|(name, transfer)| (*name, exact(transfer))).collect()
 }
 

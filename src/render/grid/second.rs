@@ -3,7 +3,7 @@
 use crate::cast::second::{self, Two, spreads};
 use crate::cast::{Frame, Gradients, Samples, Volume};
 use crate::error::{Error, Result};
-use crate::field::{Association, Field, Normal};
+use crate::field::{Association, Field, Normalization};
 use crate::integral::choice;
 use crate::integral::second::Second;
 use crate::transfer::TransferFunction;
@@ -47,7 +47,7 @@ impl Extra {
             self.gradients = Some(Gradients::new(volume, samples)?);
         }
         // Values are handed over in their own units.
-        let own = Normal { mid: 0.0, half: 1.0 };
+        let own = Normalization { mid: 0.0, half: 1.0 };
         self.function.get_or_insert_with(|| Second::new(transfer, [own; 2], volume.centre(), volume.scale, how));
         Ok(())
     }

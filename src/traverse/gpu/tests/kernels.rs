@@ -2,7 +2,7 @@
 
 use super::random::{Random, random_transfer};
 use crate::cell::{Face, Projected};
-use crate::field::{Kind, Normal};
+use crate::field::{Kind, Normalization};
 use crate::gpu::function::{Function, Knot};
 use crate::gpu::rays::twice;
 use crate::gpu::testing::{gpu, validated};
@@ -270,7 +270,7 @@ fn segments_are_integrated_as_in_f64() {
     let mut random = Random(5);
     for (round, kind) in KINDS.into_iter().chain(KINDS).enumerate() {
         let transfer = random_transfer(&mut random, round % 2 == 1);
-        let normal = [Normal { mid: 0.0, half: 1.0 }; 4];
+        let normal = [Normalization { mid: 0.0, half: 1.0 }; 4];
         let (fast, slow) =
             (Exact::<f32>::new(&transfer, kind, &normal, 1.0), Exact::<f64>::new(&transfer, kind, &normal, 1.0));
         let places: Vec<f32> = fast.opacity.s.clone();
