@@ -10,7 +10,7 @@ use halite::gpu::DeviceChoice;
 use halite::integral::choice::{Choice, Form, Planes, Texels};
 use halite::integral::table::Kind;
 use halite::mesh::{Array, Cells, Mesh, Values, cells::Tetrahedra};
-use halite::project::{Fragments, Order, Switches, Target};
+use halite::project::{Fragments, Order, ProjectionOptions, Target};
 use halite::render::{Engine, Renderer};
 use halite::transfer::TransferFunction;
 use halite::view::{Camera, Projection, View};
@@ -128,22 +128,23 @@ fn tiles_against_volumes(mut renderer: Renderer) {
     };
     let color = (0..4).flat_map(band).collect();
     renderer.set_transfer(&TransferFunction::new(color, vec![(0.0, 1.0)], 0.5).expect("a function"));
-    let switches = Switches { fragments: Fragments::Interpolated, target: Target::Rgba8, ..Switches::default() };
+    let projection =
+        ProjectionOptions { fragments: Fragments::Interpolated, target: Target::Rgba8, ..ProjectionOptions::default() };
     let texels = Texels::Unorm8;
     let volume = Choice { lengths: Kind::Uniform, table: Some([64; 3]), texels, ..Choice::of(Form::Volume) };
     let tiles =
         |planes, per_cell| Choice { planes, per_cell, table: Some([64; 3]), texels, ..Choice::of(Form::Cylindrical) };
     println!("  {:44} {:>8}", "", "frames/s");
-    for (name, choice, switches) in [
-        ("3D texture", volume, switches),
-        ("tiles, two planes of each cell", tiles(Planes::Two, true), switches),
-        ("tiles, one plane of each cell", tiles(Planes::One, true), switches),
-        ("tiles, two planes of each fragment", tiles(Planes::Two, false), switches),
-        ("tiles with two triangles", tiles(Planes::Packed, true), switches),
-        ("exact", Choice::default(), switches),
-        ("exact, intersected, 32-bit floats", Choice::default(), Switches::default()),
+    for (name, choice, projection) in [
+        ("3D texture", volume, projection),
+        ("tiles, two planes of each cell", tiles(Planes::Two, true), projection),
+        ("tiles, one plane of each cell", tiles(Planes::One, true), projection),
+        ("tiles, two planes of each fragment", tiles(Planes::Two, false), projection),
+        ("tiles with two triangles", tiles(Planes::Packed, true), projection),
+        ("exact", Choice::default(), projection),
+        ("exact, intersected, 32-bit floats", Choice::default(), ProjectionOptions::default()),
     ] {
-        renderer.set_switches(switches);
+        renderer.set_projection(projection);
         renderer.set_integral(choice);
         let rate = rate(&mut renderer, |_| around(DVec3::ZERO, 1.0, 0.0), [512, 384], false);
         println!("  {name:44} {rate:>8.1}");
@@ -202,8 +203,9 @@ fn sorts_and_data(mut renderer: Renderer) {
             ("by circumspheres", Order::Circumsphere),
             ("none", Order::None),
         ] {
-            let switches = Switches { order, fragments: Fragments::Interpolated, ..Switches::default() };
-            renderer.set_switches(switches);
+            let projection =
+                ProjectionOptions { order, fragments: Fragments::Interpolated, ..ProjectionOptions::default() };
+            renderer.set_projection(projection);
             let camera = |step: f64| around(low.midpoint(high), (high - low).length() / 2.0, step);
             let rate = rate(&mut renderer, camera, [1280, 960], true);
             let ratio = *numeric.get_or_insert(rate) / rate;

@@ -16,7 +16,7 @@ use crate::image::Image;
 use crate::integral::Choice;
 use crate::mesh::Mesh;
 use crate::mesh::cells::Tetrahedra;
-use crate::project::Switches;
+use crate::project::ProjectionOptions;
 use crate::render::{Renderer, Stats};
 use crate::transfer::TransferFunction;
 use crate::view::View;
@@ -119,8 +119,8 @@ impl Session {
     }
 
     /// Draws by another variant of the projection engine from now on; nothing to other engines.
-    pub fn set_switches(&mut self, switches: Switches) {
-        self.renderer.set_switches(switches);
+    pub fn set_projection(&mut self, projection: ProjectionOptions) {
+        self.renderer.set_projection(projection);
     }
 
     /// Rebuilds the fields of regular and rectilinear grids between samples by an order that options know by this name, or

@@ -2,7 +2,7 @@
 //!
 //! Shirley & Tuchman's projected tetrahedra (1990) as Kraus, Qiao & Ebert made them right (Projecting Tetrahedra
 //! without Rendering Artifacts, 2004). Its order is that of [`crate::order::mpvo`]; sorted by depth it needs no neighbours, so it also
-//! draws meshes whose topology moves. It is a test bed, in which each published variant can be switched on: [`Switches`] are what differs.
+//! draws meshes whose topology moves. It is a test bed, in which each published variant can be switched on: [`ProjectionOptions`] are what differs.
 
 pub(crate) mod cpu;
 pub(crate) mod gpu;
@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 /// Which variant of the engine draws. The default is the most accurate.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
-pub struct Switches {
+pub struct ProjectionOptions {
     /// Where the values and lengths of a fragment come from.
     pub fragments: Fragments,
     /// How long a ray's way through a cell is; not for [`Fragments::Intersected`].
@@ -31,7 +31,7 @@ pub struct Switches {
     pub compositing: Compositing,
 }
 
-impl Switches {
+impl ProjectionOptions {
     /// Whether the walk may draw pixels of the picture.
     pub(crate) fn walks(&self) -> bool {
         self.cycles == Cycles::Walk && self.compositing == Compositing::Over && self.target == Target::Rgba32float

@@ -27,7 +27,7 @@ use crate::integral::{Choice, Exact, Form, lookup};
 use crate::memory;
 use crate::mesh::Mesh;
 use crate::mesh::cells::Tetrahedra;
-use crate::project::Switches;
+use crate::project::ProjectionOptions;
 use crate::transfer::TransferFunction;
 use crate::view::{Blend, View};
 pub use answer::Answer;
@@ -56,7 +56,7 @@ pub struct Renderer {
     choice: DeviceChoice,
     engine: Engine,
     backend: Backend,
-    switches: Switches,
+    projection: ProjectionOptions,
     mesh: Option<Loaded>,
     stay: Stay,
     /// The grid that is drawn, in place of a mesh.
@@ -124,7 +124,7 @@ impl Renderer {
             choice,
             engine,
             backend,
-            switches: Switches::default(),
+            projection: ProjectionOptions::default(),
             mesh: None,
             stay: Stay::default(),
             grid: None,
@@ -191,8 +191,8 @@ impl Renderer {
     }
 
     /// Draws with other variants of the projection engine from now on; nothing to other engines.
-    pub fn set_switches(&mut self, switches: Switches) {
-        self.switches = switches;
+    pub fn set_projection(&mut self, projection: ProjectionOptions) {
+        self.projection = projection;
     }
 
     /// Integrates segments in another form from now on. The next frame waits for its table, if one was named; with
@@ -457,10 +457,10 @@ impl Renderer {
         self.stats.table_ms = built.as_ref().map_or(0.0, |b| b.ms);
         self.stats.table_bytes = table.map_or(0, |t| Choice::bytes(t.size()));
         // What draws by itself is exact: variants are for those who ask for the projection.
-        let none = Switches::default();
-        let switches = if self.engine == Engine::Auto { &none } else { &self.switches };
+        let none = ProjectionOptions::default();
+        let projection = if self.engine == Engine::Auto { &none } else { &self.projection };
         let as_values = self.as_values;
-        let frame = Frame { mesh, field, transfer, exact, table, view, switches, as_values, progress };
+        let frame = Frame { mesh, field, transfer, exact, table, view, projection, as_values, progress };
         let uploaded = self.backend.gpu().map_or(0, Gpu::uploaded);
         let mut walk = Backend::Walk;
         let backend = if mesh.left_to_walk { &mut walk } else { &mut self.backend };

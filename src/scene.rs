@@ -75,7 +75,7 @@ pub struct Scene {
     pub integral: Option<Value>,
     /// How fields of regular and rectilinear grids are rebuilt along rays.
     pub reconstruction: Option<Reconstruction>,
-    /// The projection engine's switches.
+    /// The projection engine's options.
     pub projection: Option<Value>,
 }
 

@@ -15,7 +15,7 @@ use halite::integral::choice::{Alpha, Build, Choice, Form, Planes, Texels};
 use halite::integral::table::Kind;
 use halite::mesh::cells::Tetrahedra;
 use halite::mesh::{Array, Values, generate};
-use halite::project::{Fragments, Switches};
+use halite::project::{Fragments, ProjectionOptions};
 use halite::render::{Engine, Renderer};
 use halite::scene;
 use halite::transfer::{Emission, TransferFunction};
@@ -208,9 +208,10 @@ fn a_plane_serves_a_cell_in_parallel_views() {
     let per_cell = Choice { per_cell: true, ..cylindrical(Planes::Two) };
     let mut errors = |projection| {
         let view = view(projection);
-        renderer.set_switches(Switches::default());
+        renderer.set_projection(ProjectionOptions::default());
         let by_fragment = image(renderer, cylindrical(Planes::Two), &view);
-        renderer.set_switches(Switches { fragments: Fragments::Interpolated, ..Switches::default() });
+        renderer
+            .set_projection(ProjectionOptions { fragments: Fragments::Interpolated, ..ProjectionOptions::default() });
         image(renderer, per_cell, &view).compare(&by_fragment).unwrap().max
     };
     let (parallel, perspective) = (errors(PARALLEL), errors(PERSPECTIVE));

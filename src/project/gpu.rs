@@ -12,7 +12,7 @@ mod ordering;
 mod program;
 mod record;
 
-use super::{Counts, Fragments, Order, Switches, Target};
+use super::{Counts, Fragments, Order, ProjectionOptions, Target};
 use crate::error::{Error, Result};
 use crate::field::Kind;
 use crate::geometry::{Geometry, Values};
@@ -220,39 +220,39 @@ impl Project {
         exact: &Exact<f32>,
         table: Option<&Arc<Lookup>>,
         view: &View,
-        switches: &Switches,
+        options: &ProjectionOptions,
     ) -> Result<(Vec<[f32; 4]>, Counts)> {
         let is_maximum = view.blend() == Blend::Maximum;
         // Nothing is blended, and no segment integrated.
-        let format = if is_maximum { wgpu::TextureFormat::Rgba32Float } else { self.format(switches.target)? };
+        let format = if is_maximum { wgpu::TextureFormat::Rgba32Float } else { self.format(options.target)? };
         let table = table.filter(|_| !is_maximum);
         self.upload(geometry, values)?;
         self.prepare_table(exact, table)?;
         let association = arrays::association(values);
         let arrays = self.arrays()?;
         let seen = Seen::new(geometry, view);
-        let is_rare = switches.fragments == Fragments::Intersected && (switches.dithers() || seen.limits().any());
+        let is_rare = options.fragments == Fragments::Intersected && (options.dithers() || seen.limits().any());
         let has_line = table.is_none() && !is_maximum && exact.kind != Kind::Pair;
-        let layout = Layout::new(switches.fragments, exact.kind.components(), has_line, is_rare);
+        let layout = Layout::new(options.fragments, exact.kind.components(), has_line, is_rare);
         let variant = Variant { kind: exact.kind, direct: exact.direct };
         let mut limits = seen.limits();
         // In parallel views all segments of a cell are on one plane.
         let one_plane = table.is_some_and(|t| t.choice().per_cell) || view.eye().is_none();
-        limits.plane_per_cell = one_plane && switches.fragments != Fragments::Intersected;
-        let drawn = Drawn { switches, blend: view.blend() };
+        limits.plane_per_cell = one_plane && options.fragments != Fragments::Intersected;
+        let drawn = Drawn { options, blend: view.blend() };
         let source = program(&variant, association, drawn, &layout, table.map(|t| &**t), limits, &arrays);
         self.prepare_canvas(&layout, view.size(), format, is_maximum)?;
         self.compile(&arrays, source, drawn, layout, format)?;
         let frame = Pass::new(self, &seen)?;
         // Without neighbours there is depth.
-        let by = match switches.order {
+        let by = match options.order {
             // The largest value needs none.
             _ if is_maximum => Order::None,
             order if geometry.is_connected() || order.rule().is_none() => order,
             _ => Order::Depth,
         };
         let mut counts = Counts { order: by, ..Counts::default() };
-        let splits = switches.fragments != Fragments::Intersected && view.eye().is_some();
+        let splits = options.fragments != Fragments::Intersected && view.eye().is_some();
         let asked = Sequencing { by, splits, all: is_maximum };
         if !self.ordered.as_ref().is_some_and(|o| o.holds_for(&seen, asked)) {
             let start = Instant::now();

@@ -8,7 +8,7 @@ use crate::geometry::{Geometry, Values};
 use crate::gpu::{DeviceChoice, Gpu, Part};
 use crate::integral::{Exact, Integral, Lookup};
 use crate::project::cpu::{self as sweep, Sweep};
-use crate::project::{self, Switches, gpu::Project};
+use crate::project::{self, ProjectionOptions, gpu::Project};
 use crate::render::Engine;
 use crate::traverse::cpu;
 use crate::traverse::gpu::Traverse;
@@ -223,7 +223,7 @@ fn walk_on<const N: usize>(traverse: &mut Traverse, frame: &Frame, values: &Valu
 }
 
 fn project_by<const N: usize>(sweep: &mut Sweep, frame: &Frame, values: &Values<N>) -> Result<Drawn> {
-    if *frame.switches != Switches::default() {
+    if *frame.projection != ProjectionOptions::default() {
         return Err(Error::Device("the projection engine has variants on a graphics device only".into()));
     }
     let color = |v: &[f32; N]| frame.largest(v);
@@ -251,13 +251,13 @@ fn project_by<const N: usize>(sweep: &mut Sweep, frame: &Frame, values: &Values<
 }
 
 fn project_on<const N: usize>(project: &mut Project, frame: &Frame, values: &Values<N>) -> Result<Drawn> {
-    let Frame { mesh, exact, table, view, switches, .. } = frame;
-    let (mut pixels, counts) = project.render(&mesh.geometry, values, exact, *table, view, switches)?;
+    let Frame { mesh, exact, table, view, projection, .. } = frame;
+    let (mut pixels, counts) = project.render(&mesh.geometry, values, exact, *table, view, projection)?;
     let mut walked = vec![];
     if view.blend() == Blend::Maximum {
         let color = |p: &[f32; 4]| Traverse::largest(p).map_or([0.0; 4], |v: [f32; N]| frame.largest(&v));
         pixels.par_iter_mut().for_each(|p| *p = color(p));
-    } else if switches.walks() {
+    } else if projection.walks() {
         walked.extend(project.disordered().iter().map(|&p| p as usize));
         let color = |v: &[f32; N]| frame.largest(v);
         let by_cpu = cpu::render_pixels(&mesh.geometry, values, integral(frame), &color, view, &walked);

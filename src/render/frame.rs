@@ -5,7 +5,7 @@ use super::largest::Largest;
 use super::loaded::Loaded;
 use super::prepared::Prepared;
 use crate::integral::{Exact, Lookup};
-use crate::project::Switches;
+use crate::project::ProjectionOptions;
 use crate::transfer::TransferFunction;
 use crate::view::View;
 use std::sync::Arc;
@@ -18,7 +18,7 @@ pub(super) struct Frame<'a> {
     pub(super) exact: &'a Exact<f32>,
     pub(super) table: Option<&'a Arc<Lookup>>,
     pub(super) view: &'a View,
-    pub(super) switches: &'a Switches,
+    pub(super) projection: &'a ProjectionOptions,
     /// Largest values become pixels as [`Largest`] says.
     pub(super) as_values: bool,
     pub(super) progress: &'a Progress<'a>,

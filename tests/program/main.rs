@@ -347,8 +347,8 @@ fn variants_of_the_projection_engine() {
     let exact = variants.iter().find(|v| v["variant"] == "intersected, exact").unwrap();
     assert!(variants.len() > 12 && exact["rmse"].as_f64().unwrap() < 1e-2, "{study}");
     // What a scene asks for can be switched off.
-    let switches = r#""engine": "project", "projection": {"target": "rgba8", "dither": true}, "size""#;
-    place.write("dithered.json", &SCENE.replace("\"size\"", switches));
+    let options = r#""engine": "project", "projection": {"target": "rgba8", "dither": true}, "size""#;
+    place.write("dithered.json", &SCENE.replace("\"size\"", options));
     let draw = |options: &str| {
         place.succeeds(&format!("render dithered.json --out a.npy {options}"));
         std::fs::read(place.path("a.npy")).unwrap()

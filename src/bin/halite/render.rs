@@ -13,7 +13,7 @@ use halite::grid::Grid;
 use halite::integral::choice::{Choice, Form};
 use halite::io::Time;
 use halite::mesh::{Mesh, cells::Tetrahedra};
-use halite::project::Switches;
+use halite::project::ProjectionOptions;
 use halite::render::{Engine, Renderer};
 use halite::scene::{Scalars, Scene, automatic, missing};
 use halite::view::{Blend, ClippingPlane, Cropping, REGIONS};
@@ -370,7 +370,7 @@ impl Request {
         }
     }
 
-    /// A renderer on `device`, with the engine and its switches that were asked for.
+    /// A renderer on `device`, with the engine and the options of projection that were asked for.
     pub(crate) fn renderer(&self, threads: usize, scene: Option<&Scene>, device: DeviceChoice) -> Result<Renderer> {
         let engine = self.engine.or(scene.and_then(|s| s.engine)).unwrap_or_default();
         let others = self.variant.given().join(", ");
@@ -390,8 +390,8 @@ impl Request {
             ));
         }
         renderer.set_reconstruction(Reconstruction { order, sampling });
-        let switches = scene.map_or(Ok(Switches::default()), |s| variant::of_scene(s, &self.input))?;
-        renderer.set_switches(self.variant.apply(switches));
+        let projection = scene.map_or(Ok(ProjectionOptions::default()), |s| variant::of_scene(s, &self.input))?;
+        renderer.set_projection(self.variant.apply(projection));
         renderer.set_integral(self.choice(scene)?);
         Ok(renderer)
     }

@@ -13,7 +13,7 @@ use crate::gpu::table::{self, TABLE};
 use crate::integral::Lookup;
 use crate::order::depth::HIDDEN;
 use crate::order::{MOST_PARTS, PART};
-use crate::project::{Compositing, Fragments, Switches, Thickness};
+use crate::project::{Compositing, Fragments, ProjectionOptions, Thickness};
 use crate::view::Blend;
 use wgpu::ShaderStages as Stages;
 
@@ -51,7 +51,7 @@ fn fragment_of(front: Value, back: Value, length: f32, words: Words, at: vec2f, 
 /// How a frame is drawn.
 #[derive(Clone, Copy)]
 pub(super) struct Drawn<'a> {
-    pub(super) switches: &'a Switches,
+    pub(super) options: &'a ProjectionOptions,
     pub(super) blend: Blend,
 }
 
@@ -85,8 +85,8 @@ impl Project {
         layout: Layout,
         format: wgpu::TextureFormat,
     ) -> Result<()> {
-        let Drawn { switches, blend } = drawn;
-        let compositing = switches.compositing;
+        let Drawn { options, blend } = drawn;
+        let compositing = options.compositing;
         let same = |p: &Program| p.source == source && p.format == format && p.compositing == compositing;
         if let Some(known) = self.programs.iter().position(same) {
             self.programs[..=known].rotate_right(1);
@@ -107,7 +107,7 @@ impl Project {
             operation: wgpu::BlendOperation::Add,
         });
         // The outline of an intersected cell may be no more than that: grown, it need not turn one way.
-        let culled = (switches.fragments != Fragments::Intersected).then_some(wgpu::Face::Back);
+        let culled = (options.fragments != Fragments::Intersected).then_some(wgpu::Face::Back);
         let program = Program {
             classify: raster::compute(gpu, &module, "classify", &cells),
             project: raster::compute(gpu, &module, "project_all", &cells),
@@ -137,7 +137,7 @@ impl Project {
 pub(super) fn program(
     variant: &Variant,
     association: &str,
-    Drawn { switches, blend }: Drawn,
+    Drawn { options, blend }: Drawn,
     layout: &Layout,
     table: Option<&Lookup>,
     limits: Limits,
@@ -151,15 +151,15 @@ pub(super) fn program(
     {
         text += &format!("const {name} = {value:?}f;\n");
     }
-    let form = match switches.fragments {
+    let form = match options.fragments {
         Fragments::Intersected => "INTERSECTED",
         Fragments::Interpolated => "INTERPOLATED",
         Fragments::Linear => "LINEAR",
     };
     for (name, value) in [
-        ("BY_DEPTH", switches.thickness == Thickness::Depth),
-        ("DITHERED", switches.dithers()),
-        ("ADDITIVE", switches.compositing == Compositing::Additive),
+        ("BY_DEPTH", options.thickness == Thickness::Depth),
+        ("DITHERED", options.dithers()),
+        ("ADDITIVE", options.compositing == Compositing::Additive),
         ("HAS_ENDS", limits.ends),
         ("HAS_PLANES", limits.planes),
         ("IS_CLIPPED", limits.range),

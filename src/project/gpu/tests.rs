@@ -32,12 +32,12 @@ fn every_program_is_valid() {
                     choices().into_iter().map(|c| Some(Lookup::new(&exact(Emission::Chromatic), &c, 2.0).unwrap()));
                 for (i, table) in std::iter::once(None).chain(tables).enumerate() {
                     let has_line = table.is_none() && kind != Kind::Pair;
-                    let switches = Switches {
+                    let options = ProjectionOptions {
                         fragments,
                         compositing: if i % 3 == 1 { Compositing::Additive } else { Compositing::Over },
                         dither: true,
                         target: Target::Rgba8,
-                        ..Switches::default()
+                        ..ProjectionOptions::default()
                     };
                     let limits = Limits {
                         ends: direct,
@@ -51,7 +51,7 @@ fn every_program_is_valid() {
                     let layout =
                         Layout::new(fragments, kind.components(), has_line, fragments == Fragments::Intersected);
                     for blend in [Blend::Composite, Blend::Maximum] {
-                        let drawn = Drawn { switches: &switches, blend };
+                        let drawn = Drawn { options: &options, blend };
                         validated(&program(&variant, association, drawn, &layout, table.as_ref(), limits, &arrays));
                     }
                 }
@@ -70,11 +70,11 @@ fn layouts_match_their_rust_twins() {
                 has_line,
                 kind == Kind::Pair && fragments == Fragments::Intersected,
             );
-            let switches = Switches { fragments, ..Switches::default() };
+            let options = ProjectionOptions { fragments, ..ProjectionOptions::default() };
             let module = validated(&program(
                 &Variant { kind, direct: false },
                 "POINT",
-                Drawn { switches: &switches, blend: Blend::Composite },
+                Drawn { options: &options, blend: Blend::Composite },
                 &layout,
                 None,
                 Limits::default(),
@@ -177,7 +177,7 @@ fn pictures_do_not_depend_on_who_sorts() {
     let mut drawn = vec![];
     let (mut walk, _) = prepared(Engine::Traverse, DeviceChoice::Cpu, 8, [48, 40]);
     for order in [Order::Depth, Order::Circumsphere, Order::Mpvo] {
-        renderer.set_switches(Switches { order, ..Switches::default() });
+        renderer.set_projection(ProjectionOptions { order, ..ProjectionOptions::default() });
         for (i, view) in views.iter().enumerate() {
             let [host, device] = [false, true].map(|on_device| {
                 renderer.backend().project().unwrap().sort_on_device(on_device);
@@ -209,7 +209,7 @@ fn orders_of_several_buffers_are_one() {
         TransferFunction::new(vec![(-1.0, [1.0, 0.5, 0.0]), (1.0, [0.0, 0.5, 1.0])], vec![(-1.0, 9.0)], 1.0);
     renderer.set_transfer(&everything.unwrap());
     for order in [Order::Mpvo, Order::Depth] {
-        renderer.set_switches(Switches { order, ..Switches::default() });
+        renderer.set_projection(ProjectionOptions { order, ..ProjectionOptions::default() });
         let one = renderer.render(&view, &|_| ()).unwrap();
         let project = renderer.backend().project().unwrap();
         let whole = project.gpu().binding;

@@ -8,7 +8,7 @@ use halite::gpu::DeviceChoice;
 use halite::image::{Backdrop, Image};
 use halite::integral::choice::{Alpha, Choice, Form, Planes};
 use halite::integral::table::Kind;
-use halite::project::{Fragments, Switches};
+use halite::project::{Fragments, ProjectionOptions};
 use halite::render::{Engine, Renderer, Stats};
 use halite::view::View;
 use serde_json::json;
@@ -78,17 +78,17 @@ pub(super) fn run(options: &Options, threads: usize) -> Result<()> {
         set(&mut renderer, &job)?;
         let Stats { engine, adapter, .. } = renderer.stats().clone();
         let name = format!("{engine} on {adapter}");
-        let best = Switches::default();
-        let interpolated = Switches { fragments: Fragments::Interpolated, ..best };
+        let best = ProjectionOptions::default();
+        let interpolated = ProjectionOptions { fragments: Fragments::Interpolated, ..best };
         let mut all: Vec<_> = forms(false, size).into_iter().map(|f| (f, best)).collect();
         if engine == "project" {
             all.extend(forms(true, size).into_iter().map(|f| (f, interpolated)));
         }
         let count = all.len() as f64;
         progress::during("drawing", |p| {
-            for (i, ((form, integral), switches)) in all.into_iter().enumerate() {
+            for (i, ((form, integral), projection)) in all.into_iter().enumerate() {
                 p(i as f64 / count);
-                let variant = Variant { name: form, place: "", switches, integral };
+                let variant = Variant { name: form, place: "", projection, integral };
                 match draw(variant, options.frames, &mut renderer, &view, &truth) {
                     Ok(row) => {
                         let Stats { table_ms, table_bytes, .. } = *renderer.stats();
@@ -111,7 +111,7 @@ pub(super) fn run(options: &Options, threads: usize) -> Result<()> {
 
 fn draw(variant: Variant, frames: u32, renderer: &mut Renderer, view: &View, truth: &Image) -> halite::Result<Row> {
     renderer.set_integral(variant.integral);
-    renderer.set_switches(variant.switches);
+    renderer.set_projection(variant.projection);
     let image = renderer.render(view, &|_| ())?;
     Row::measured(variant, image, truth, frames, renderer, view)
 }
@@ -141,7 +141,7 @@ fn write(options: &Options, job: &Job, rows: &[Line]) -> Result<()> {
         .map(|Line { engine, table_ms, bytes, row }| {
             json!({
                 "form": row.variant.name, "engine": engine, "integral": row.variant.integral,
-                "switches": row.variant.switches, "table_bytes": bytes, "table_ms": table_ms, "max": row.max,
+                "switches": row.variant.projection, "table_bytes": bytes, "table_ms": table_ms, "max": row.max,
                 "rmse": row.rmse, "frame_ms": row.frame_ms,
             })
         })

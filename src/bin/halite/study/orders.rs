@@ -11,7 +11,7 @@ use halite::integral::choice::Choice;
 use halite::mesh::faces::Faces;
 use halite::order::check::{self, Verdict};
 use halite::order::mpvo::{Mpvo, Rule, Sequence};
-use halite::project::{Cycles, Order, Switches};
+use halite::project::{Cycles, Order, ProjectionOptions};
 use halite::render::{Engine, Renderer};
 use halite::scene::Scene;
 use halite::view::View;
@@ -113,8 +113,8 @@ fn studied(
         for (i, (name, place, rule, order)) in ORDERS.into_iter().enumerate() {
             p(i as f64 / ORDERS.len() as f64);
             // Cycles are not left to the walk: what is wrong shows.
-            let switches = Switches { order, cycles: Cycles::Cut, ..Switches::default() };
-            let variant = Variant { name, place, switches, integral: Choice::default() };
+            let projection = ProjectionOptions { order, cycles: Cycles::Cut, ..ProjectionOptions::default() };
+            let variant = Variant { name, place, projection, integral: Choice::default() };
             match draw(variant, options.frames, renderer, &view, &truth) {
                 Ok(row) => {
                     let (sequence, verdict) = judge.install(|| judged(&mut mpvo, &geometry, &view, rule));
@@ -148,7 +148,7 @@ impl Studied {
     fn report(&self) -> Value {
         let row = |Line { verdict: v, row }: &Line| {
             json!({
-                "order": row.variant.name, "switches": row.variant.switches, "pairs": v.pairs,
+                "order": row.variant.name, "switches": row.variant.projection, "pairs": v.pairs,
                 "inversions": v.inversions, "overlaps": v.overlaps, "pixels": v.pixels,
                 "wrong_pixels": v.wrong.len(), "max": row.max, "rmse": row.rmse, "order_ms": row.order_ms,
                 "frame_ms": row.frame_ms,
