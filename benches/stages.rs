@@ -6,7 +6,7 @@
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec3;
 use halite::field::{Component, Field, Kind, Normalization};
-use halite::geometry::Geometry;
+use halite::geometry::TetMesh;
 use halite::gpu::{self, DeviceChoice};
 use halite::integral::{Exact, Light};
 use halite::mesh::{Mesh, cells::Tetrahedra, faces::Faces, generate};
@@ -75,7 +75,7 @@ fn before_drawing(c: &mut Criterion) {
     let tetrahedra = Tetrahedra::new(&mesh).expect("cells");
     group.bench_function("faces", |b| b.iter(|| Faces::new(mesh.points(), &tetrahedra.corners)));
     let faces = Faces::new(mesh.points(), &tetrahedra.corners);
-    group.bench_function("geometry", |b| b.iter(|| Geometry::new(mesh.points(), &tetrahedra, &faces)));
+    group.bench_function("geometry", |b| b.iter(|| TetMesh::new(mesh.points(), &tetrahedra, &faces)));
     group.finish();
 }
 

@@ -18,7 +18,7 @@ use crate::cast::Reconstruction;
 pub use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::field::{Field, Kind};
-use crate::geometry::Geometry;
+use crate::geometry::TetMesh;
 use crate::gpu::Part;
 use crate::gpu::table::builds;
 use crate::gpu::{DeviceChoice, Gpu};
@@ -362,7 +362,7 @@ impl Renderer {
     /// [`Error::NoMemory`] if there is not.
     pub fn check_room(&self, points: usize, tetrahedra: &Tetrahedra) -> Result<()> {
         let (points, count) = (points + tetrahedra.added.len(), tetrahedra.corners.len());
-        memory::check(&format!("{count} tetrahedra of {points} points"), Geometry::room(points, count))
+        memory::check(&format!("{count} tetrahedra of {points} points"), TetMesh::room(points, count))
     }
 
     /// Normalises the values anew if the transfer function has changed and asks for it.

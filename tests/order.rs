@@ -7,7 +7,7 @@ mod common;
 use common::draw::{self, Random};
 use common::{rounds, shared};
 use glam::{DMat3, DVec3, dvec3};
-use halite::geometry::Geometry;
+use halite::geometry::TetMesh;
 use halite::mesh::cells::Tetrahedra;
 use halite::mesh::faces::Faces;
 use halite::mesh::{Mesh, generate};
@@ -16,15 +16,15 @@ use halite::order::mpvo::{Mpvo, Rule, Sequence};
 use halite::view::{Camera, Projection, View};
 use robust::Coord3D;
 
-fn geometry(mesh: &Mesh) -> Geometry {
+fn geometry(mesh: &Mesh) -> TetMesh {
     geometry_of(mesh).unwrap()
 }
 
 /// The geometry of a mesh that can be split into tetrahedra.
-fn geometry_of(mesh: &Mesh) -> Option<Geometry> {
+fn geometry_of(mesh: &Mesh) -> Option<TetMesh> {
     let tetrahedra = Tetrahedra::new(mesh).ok()?;
     let points = tetrahedra.points(mesh.points());
-    Some(Geometry::new(&points, &tetrahedra, &Faces::new(&points, &tetrahedra.corners)))
+    Some(TetMesh::new(&points, &tetrahedra, &Faces::new(&points, &tetrahedra.corners)))
 }
 
 /// A mesh of these tetrahedra.
@@ -32,7 +32,7 @@ fn mesh_of(points: Vec<DVec3>, cells: &[[u32; 4]]) -> Mesh {
     draw::mesh_of(points, cells.iter().map(|c| (10, &c[..])))
 }
 
-fn judged(geometry: &Geometry, view: &View, rule: Rule) -> (Sequence, Verdict) {
+fn judged(geometry: &TetMesh, view: &View, rule: Rule) -> (Sequence, Verdict) {
     let sequence = Mpvo::default().sequence(geometry, view, rule);
     let entries: Vec<u32> = sequence.cells.iter().rev().copied().collect();
     let mut all = entries.clone();

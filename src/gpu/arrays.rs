@@ -4,7 +4,7 @@ use super::buffers::Chunks;
 use super::shader::Array;
 use super::{Gpu, rays};
 use crate::error::Result;
-use crate::geometry::{Geometry, Values};
+use crate::geometry::{TetMesh, Values};
 
 /// An element of [`points`]: each coordinate is the sum of two.
 pub(crate) const POINT: &str = "\
@@ -20,7 +20,7 @@ pub(crate) const INVISIBLE: f32 = 3e38;
 ///
 /// # Errors
 /// Those of [`Chunks::new`].
-pub(crate) fn points(gpu: &Gpu, geometry: &Geometry) -> Result<Chunks> {
+pub(crate) fn points(gpu: &Gpu, geometry: &TetMesh) -> Result<Chunks> {
     Chunks::new(gpu, "points", &geometry.points, |&p| {
         let [[x, y, z], [x_low, y_low, z_low]] = rays::twice(p);
         [x, y, z, x_low, y_low, z_low]

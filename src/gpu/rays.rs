@@ -1,6 +1,6 @@
 //! A view's rays, and what limits them, as shaders of all engines read them: in normalised coordinates.
 
-use crate::geometry::Geometry;
+use crate::geometry::TetMesh;
 use crate::view::{ClippingPlane, Fan, View};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -30,7 +30,7 @@ pub(crate) fn affine([first, by_column, by_row]: [DVec3; 3]) -> [[[f32; 4]; 2]; 
 }
 
 /// Clipping planes: dot(p, plane.xyz) + plane.w ≥ 0 is kept of what is at `p` from `base`.
-pub(crate) fn planes(view: &View, geometry: &Geometry, base: DVec3) -> Vec<[f32; 4]> {
+pub(crate) fn planes(view: &View, geometry: &TetMesh, base: DVec3) -> Vec<[f32; 4]> {
     let plane = |p: &ClippingPlane| {
         let normal = (p.normal / p.normal.abs().max_element()).normalize();
         let height = normal.dot((geometry.centre - p.origin) * geometry.scale + base);

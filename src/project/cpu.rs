@@ -18,7 +18,7 @@ mod setup;
 #[cfg(test)]
 pub(crate) mod tests;
 
-use crate::geometry::{Geometry, Values};
+use crate::geometry::{TetMesh, Values};
 use crate::integral::Integral;
 use crate::memory::prefetch;
 use crate::order::crossings::Crossings;
@@ -80,7 +80,7 @@ pub(crate) struct Counts {
 
 /// What a frame is drawn from.
 pub(crate) struct Frame<'a, const N: usize> {
-    pub(crate) geometry: &'a Geometry,
+    pub(crate) geometry: &'a TetMesh,
     pub(crate) values: &'a Values<N>,
     pub(crate) integral: Integral<'a>,
     pub(crate) view: &'a View,

@@ -15,7 +15,7 @@ mod record;
 use super::{Counts, Fragments, Order, ProjectionOptions, Target};
 use crate::error::{Error, Result};
 use crate::field::Kind;
-use crate::geometry::{Geometry, Values};
+use crate::geometry::{TetMesh, Values};
 use crate::gpu::buffers::{Buffer, Chunks};
 use crate::gpu::raster::{self, Slot, Texture};
 use crate::gpu::shader::{Array, Variant};
@@ -177,7 +177,7 @@ impl Project {
     }
 
     /// Hands over what the device does not hold yet.
-    fn upload<const N: usize>(&mut self, geometry: &Geometry, values: &Values<N>) -> Result<()> {
+    fn upload<const N: usize>(&mut self, geometry: &TetMesh, values: &Values<N>) -> Result<()> {
         let gpu = &self.gpu;
         if self.cells.is_none() {
             self.cells = Some(Chunks::new(gpu, "cells", &geometry.cells, |c| c.corners)?);
@@ -215,7 +215,7 @@ impl Project {
     /// [`Error::Device`] if the device cannot blend into the target, and those of [`Gpu::check`] and [`Buffer::new`].
     pub(crate) fn render<const N: usize>(
         &mut self,
-        geometry: &Geometry,
+        geometry: &TetMesh,
         values: &Values<N>,
         exact: &Exact<f32>,
         table: Option<&Arc<Lookup>>,

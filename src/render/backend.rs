@@ -4,7 +4,7 @@
 use super::frame::Frame;
 use super::stats::{ProjectionStats, SweepStats};
 use crate::error::{Error, Result};
-use crate::geometry::{Geometry, Values};
+use crate::geometry::{TetMesh, Values};
 use crate::gpu::{DeviceChoice, Gpu, Part};
 use crate::integral::{Exact, Integral, Lookup};
 use crate::project::cpu::{self as sweep, Sweep};
@@ -36,15 +36,15 @@ pub(super) struct Needs {
     pub(super) neighbours: bool,
     /// It reads neighbours if it is to draw in an order that needs them.
     pub(super) order: bool,
-    /// It draws meshes that are flat: see [`Geometry::is_flat`].
+    /// It draws meshes that are flat: see [`TetMesh::is_flat`].
     sheets: bool,
-    /// It draws meshes that are as thin in two directions: see [`Geometry::is_needle`].
+    /// It draws meshes that are as thin in two directions: see [`TetMesh::is_needle`].
     needles: bool,
 }
 
 impl Needs {
     /// Whether the backend can draw the mesh.
-    pub(super) fn are_met_by(self, geometry: &Geometry) -> bool {
+    pub(super) fn are_met_by(self, geometry: &TetMesh) -> bool {
         (self.sheets || !geometry.is_flat()) && (self.needles || !geometry.is_needle())
     }
 }

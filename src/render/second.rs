@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::field::gradient::length;
 use crate::field::normalization::MOST;
 use crate::field::{Association, Field, Gradient, Kind, Normalization};
-use crate::geometry::{Geometry, Values};
+use crate::geometry::{TetMesh, Values};
 use crate::image::Image;
 use crate::integral::choice::{Culling, Two};
 use crate::integral::second::{LONGEST, Pairs, Second, places};
@@ -173,7 +173,7 @@ impl Extra {
             self.values = Some(Ready { normal, values });
         }
         let Some(ready) = &self.values else { return Err(Error::Render("there are no values to draw".into())) };
-        let Geometry { centre, scale, .. } = mesh.geometry;
+        let TetMesh { centre, scale, .. } = mesh.geometry;
         let function = self.function.get_or_insert_with(|| Second::new(transfer, ready.normal, centre, scale, two));
         if two.culling == Culling::None {
             self.seen = None;
@@ -224,7 +224,7 @@ impl Extra {
 
 impl Seen {
     /// Judges all cells, on the current rayon pool.
-    fn new<const N: usize>(geometry: &Geometry, values: &Values<N>, second: &Second, culling: Culling) -> Self {
+    fn new<const N: usize>(geometry: &TetMesh, values: &Values<N>, second: &Second, culling: Culling) -> Self {
         let start = Instant::now();
         let cells = geometry.cells.len();
         let own = |v: &[f32; N]| second.own([v[0], v[1]].map(f64::from));

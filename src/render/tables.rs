@@ -6,7 +6,7 @@
 
 use super::Renderer;
 use crate::error::{Error, Result};
-use crate::geometry::{Geometry, Values};
+use crate::geometry::{TetMesh, Values};
 use crate::integral::{Choice, Exact, Lookup};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
@@ -161,7 +161,7 @@ impl Renderer {
 
 /// How many knots of the function the values of the mean cell have between them, those of opacity where that has a component of its
 /// own; of a sample, where there are many cells.
-pub(super) fn knots_in_cells<const N: usize>(geometry: &Geometry, values: &Values<N>, exact: &Exact<f32>) -> f64 {
+pub(super) fn knots_in_cells<const N: usize>(geometry: &TetMesh, values: &Values<N>, exact: &Exact<f32>) -> f64 {
     let knots = exact.opacity.places();
     let step = geometry.cells.len().div_ceil(SAMPLES).max(1);
     let (mut sum, mut count) = (0u64, 0u64);

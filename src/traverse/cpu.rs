@@ -6,7 +6,7 @@ mod segments;
 
 use crate::cell::{Face, Frame};
 use crate::geometry::boundary::{Beam, Candidate};
-use crate::geometry::{Geometry, Values};
+use crate::geometry::{TetMesh, Values};
 use crate::image::Image;
 use crate::integral::second::Second;
 use crate::integral::{Integral, Light};
@@ -53,7 +53,7 @@ pub struct Counts {
 /// for [`Blend::Maximum`]; `progress` is told the share that is done, and may say that no more is wanted: the rest
 /// stays empty.
 pub fn render<const N: usize>(
-    geometry: &Geometry,
+    geometry: &TetMesh,
     values: &Values<N>,
     integral: Integral,
     pixel: &(dyn Fn(&[f32; N]) -> [f32; 4] + Sync),
@@ -66,7 +66,7 @@ pub fn render<const N: usize>(
 /// Draws a frame whose segments are of two variables, or with light: `values` are s and g, or those and the gradient;
 /// `seen` has a bit for each cell that may be seen.
 pub(crate) fn render_two<const N: usize>(
-    geometry: &Geometry,
+    geometry: &TetMesh,
     values: &Values<N>,
     second: &Second,
     seen: Option<&[u64]>,
@@ -77,7 +77,7 @@ pub(crate) fn render_two<const N: usize>(
 }
 
 fn render_with<const N: usize, S: Segments<N>>(
-    geometry: &Geometry,
+    geometry: &TetMesh,
     values: &Values<N>,
     segments: &(impl Fn() -> S + Sync),
     pixel: &(dyn Fn(&[S::Value; N]) -> [f32; 4] + Sync),
@@ -116,7 +116,7 @@ fn render_with<const N: usize, S: Segments<N>>(
 
 /// Draws only the pixels with these indices.
 pub(crate) fn render_pixels<const N: usize>(
-    geometry: &Geometry,
+    geometry: &TetMesh,
     values: &Values<N>,
     integral: Integral,
     pixel: &(dyn Fn(&[f32; N]) -> [f32; 4] + Sync),
@@ -149,7 +149,7 @@ struct Gathered<V, const N: usize> {
 
 /// Traces rays, one after another.
 struct Tracer<'a, const N: usize, S> {
-    geometry: &'a Geometry,
+    geometry: &'a TetMesh,
     values: &'a Values<N>,
     segments: S,
     view: &'a View,
@@ -160,7 +160,7 @@ struct Tracer<'a, const N: usize, S> {
 }
 
 impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
-    fn new(geometry: &'a Geometry, values: &'a Values<N>, segments: S, view: &'a View) -> Self {
+    fn new(geometry: &'a TetMesh, values: &'a Values<N>, segments: S, view: &'a View) -> Self {
         let [low, high] = geometry.boundary.bounds();
         let both_ways = view.eye().is_some_and(|eye| {
             let eye = (eye - geometry.centre) * geometry.scale;
@@ -243,7 +243,7 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
 
     /// Collects the boundary faces that rays of the pixels `low..high` may enter through.
     fn find_candidates(&mut self, low: [u32; 2], high: [u32; 2]) {
-        let Geometry { centre, scale, points, boundary, .. } = self.geometry;
+        let TetMesh { centre, scale, points, boundary, .. } = self.geometry;
         let ([l, t], [r, b]) = (low.map(f64::from), high.map(f64::from));
         // Rays pass through pixel centres, but an offset may move them.
         let margin = 0.5 + self.view.pixel_offset().abs().max_element();
@@ -269,7 +269,7 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
     #[inline(always)]
     fn trace(&mut self, i: u32, j: u32) -> Gathered<S::Value, N> {
         let ray = self.view.ray(i, j);
-        let Geometry { centre, scale, .. } = *self.geometry;
+        let TetMesh { centre, scale, .. } = *self.geometry;
         let origin = (ray.origin - centre) * scale;
         // From the point of the ray that is nearest to the middle of the mesh, so that no distance is great.
         let start = -origin.dot(ray.direction);
@@ -323,7 +323,7 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
     /// Collects where the ray enters the mesh, in order; false if any of it is too close to an edge.
     #[inline(always)]
     fn find_entries(&mut self, frame: &Frame, pixel: DVec2) -> bool {
-        let Geometry { points, boundary, .. } = self.geometry;
+        let TetMesh { points, boundary, .. } = self.geometry;
         let mut clear = true;
         self.entries.clear();
         for c in &self.candidates {
@@ -351,7 +351,7 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
         [t_min, t_max]: [f64; 2],
         gathered: &mut Gathered<S::Value, N>,
     ) -> Option<[f64; 3]> {
-        let Geometry { points, cells, .. } = self.geometry;
+        let TetMesh { points, cells, .. } = self.geometry;
         let Entry { t, points: mut ids, mut cell, mut face } = self.entries[e];
         let (mut t, mut reached, mut weights) = (t, t_min, face.weights());
         let mut front = self.value(cell, &ids, &weights);

@@ -3,7 +3,7 @@
 use super::cpu::{Counts, least_light};
 use crate::error::{Error, Result};
 use crate::geometry::boundary::{BoundaryFace, LEAF};
-use crate::geometry::{Cell, Geometry, Values};
+use crate::geometry::{Cell, TetMesh, Values};
 use crate::gpu::buffers::{Buffer, Chunks};
 use crate::gpu::function;
 use crate::gpu::raster::Slot;
@@ -171,7 +171,7 @@ impl Traverse {
     /// Those of [`Gpu::check`] and [`Buffer::new`].
     pub(crate) fn upload<const N: usize>(
         &mut self,
-        geometry: &Geometry,
+        geometry: &TetMesh,
         values: &Values<N>,
         exact: &Exact<f32>,
     ) -> Result<()> {
@@ -215,7 +215,7 @@ impl Traverse {
     /// Those of [`Gpu::check`] and [`Buffer::new`].
     pub(crate) fn render<const N: usize>(
         &mut self,
-        geometry: &Geometry,
+        geometry: &TetMesh,
         values: &Values<N>,
         exact: &Exact<f32>,
         table: Option<&Arc<Lookup>>,
@@ -267,7 +267,7 @@ impl Traverse {
         }
     }
 
-    fn draw(&self, geometry: &Geometry, tabulated: bool, view: &View) -> Result<Drawn> {
+    fn draw(&self, geometry: &TetMesh, tabulated: bool, view: &View) -> Result<Drawn> {
         let gpu = &self.gpu;
         let (Some(function), Some((_, pipeline, group_layout))) = (&self.function, &self.program) else {
             return Err(Error::Render("the device does not hold the transfer function".into()));

@@ -5,7 +5,7 @@ use crate::{output, parse, progress};
 use anyhow::{Context, Result};
 use clap::Args;
 use halite::field::Kind;
-use halite::geometry::Geometry;
+use halite::geometry::TetMesh;
 use halite::gpu::DeviceChoice;
 use halite::gpu::construct::{Construction, Constructor};
 use halite::image::{Backdrop, Image};
@@ -117,7 +117,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     renderer.install(|| {
         let job = render::prepare(&options.request, given)?.of_mesh("tables")?;
         let points = job.tetrahedra.points(job.mesh.points());
-        let geometry = Geometry::unconnected(&points, &job.tetrahedra);
+        let geometry = TetMesh::unconnected(&points, &job.tetrahedra);
         let normal = [0, 1, 2, 3].map(|k| job.field.normal(k));
         if job.field.kind() != Kind::Scalar {
             anyhow::bail!("this compares tables of fields of one component; choose one with --component");

@@ -16,7 +16,7 @@
 
 use super::doubles::{by_cell, cross, guard, single, singles, terms, turn, wide};
 use super::outline::{Blocks, add_blocks};
-use crate::geometry::{Cell, Geometry, Values};
+use crate::geometry::{Cell, TetMesh, Values};
 use crate::integral::Exact;
 use crate::memory::prefetch;
 use crate::order::screen::{ASIDE, Lens, NEAREST, PixelBox, TILE};
@@ -147,7 +147,7 @@ static FRONTS_FIRST: [[u8; 16]; 16] = {
 /// What records are made from.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Scene<'a, const N: usize> {
-    pub(super) geometry: &'a Geometry,
+    pub(super) geometry: &'a TetMesh,
     pub(super) values: &'a Values<N>,
     pub(super) exact: &'a Exact<f32>,
     /// Red, green and blue of each line of the function at its lower knot, and their slopes.

@@ -1,6 +1,6 @@
 //! What a frame's shaders need to know of a view and a transfer function.
 
-use crate::geometry::Geometry;
+use crate::geometry::TetMesh;
 use crate::gpu::rays::{self, FAR};
 use crate::view::View;
 use bytemuck::{Pod, Zeroable};
@@ -84,7 +84,7 @@ impl Seen {
         }
     }
 
-    pub(super) fn new(geometry: &Geometry, view: &View) -> Self {
+    pub(super) fn new(geometry: &TetMesh, view: &View) -> Self {
         let fan = view.fan(geometry.centre, geometry.scale, NEAR_EYE);
         let base = fan.origin[0];
         let four = |v: DVec3, w: f64| v.extend(w).as_vec4().to_array();

@@ -3,7 +3,7 @@
 use super::frame::{Frame, Seen};
 use super::{Pass, Project, Slice, circumsphere, groups_of, unprepared};
 use crate::error::{Error, Result};
-use crate::geometry::Geometry;
+use crate::geometry::TetMesh;
 use crate::gpu::buffers::Buffer;
 use crate::gpu::raster::Readback;
 use crate::gpu::sort::Sorter;
@@ -60,7 +60,7 @@ pub(super) struct Sequenced {
 
 impl Project {
     /// Finds the order of the mesh, unless it is known.
-    pub(super) fn find_sequence(&mut self, geometry: &Geometry, view: &View, seen: &Seen, rule: Rule) {
+    pub(super) fn find_sequence(&mut self, geometry: &TetMesh, view: &View, seen: &Seen, rule: Rule) {
         if !self.sequence.as_ref().is_some_and(|s| s.frame == seen.frame && s.rule == rule) {
             let cells = self.mpvo.sequence(geometry, view, rule);
             self.sequence = Some(Sequenced { frame: seen.frame, rule, cells });
@@ -72,7 +72,7 @@ impl Project {
         &mut self,
         frame: &Pass,
         seen: &Seen,
-        geometry: &Geometry,
+        geometry: &TetMesh,
         asked: Sequencing,
     ) -> Result<Ordered> {
         let (cells, Sequencing { by, splits, .. }) = (geometry.cells.len(), asked);

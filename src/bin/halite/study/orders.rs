@@ -4,7 +4,7 @@ use super::{Options, Row, Variant, check, draw, set, sheet};
 use crate::render::{self, Job};
 use crate::{output, progress};
 use anyhow::{Context, Result};
-use halite::geometry::Geometry;
+use halite::geometry::TetMesh;
 use halite::gpu::DeviceChoice;
 use halite::image::{Backdrop, Image};
 use halite::integral::choice::Choice;
@@ -101,7 +101,7 @@ fn studied(
     let (view, _) = job.scene.view()?;
     let geometry = judge.install(|| {
         let points = job.tetrahedra.points(job.mesh.points());
-        Geometry::new(&points, &job.tetrahedra, &Faces::new(&points, &job.tetrahedra.corners))
+        TetMesh::new(&points, &job.tetrahedra, &Faces::new(&points, &job.tetrahedra.corners))
     });
     let truth = progress::during("judging", |p| {
         set(judge, job)?;
@@ -137,7 +137,7 @@ fn studied(
 }
 
 /// The sequence by a rule, and what is wrong with it.
-fn judged(mpvo: &mut Mpvo, geometry: &Geometry, view: &View, rule: Rule) -> (Sequence, Verdict) {
+fn judged(mpvo: &mut Mpvo, geometry: &TetMesh, view: &View, rule: Rule) -> (Sequence, Verdict) {
     let sequence = mpvo.sequence(geometry, view, rule);
     let entries: Vec<u32> = sequence.cells.iter().rev().copied().collect();
     let verdict = check::check(geometry, view, &entries);
