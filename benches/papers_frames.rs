@@ -7,7 +7,7 @@
 use glam::DVec3;
 use halite::field::{Association, Component, Field};
 use halite::gpu::DeviceChoice;
-use halite::integral::choice::{Choice, Form, Planes, Texels};
+use halite::integral::options::{Form, IntegrationOptions, Planes, Texels};
 use halite::integral::table::Kind;
 use halite::mesh::{Array, Cells, Mesh, Values, cells::Tetrahedra};
 use halite::project::{Fragments, Order, ProjectionOptions, Target};
@@ -131,9 +131,19 @@ fn tiles_against_volumes(mut renderer: Renderer) {
     let projection =
         ProjectionOptions { fragments: Fragments::Interpolated, target: Target::Rgba8, ..ProjectionOptions::default() };
     let texels = Texels::Unorm8;
-    let volume = Choice { lengths: Kind::Uniform, table: Some([64; 3]), texels, ..Choice::of(Form::Volume) };
-    let tiles =
-        |planes, per_cell| Choice { planes, per_cell, table: Some([64; 3]), texels, ..Choice::of(Form::Cylindrical) };
+    let volume = IntegrationOptions {
+        lengths: Kind::Uniform,
+        table: Some([64; 3]),
+        texels,
+        ..IntegrationOptions::of(Form::Volume)
+    };
+    let tiles = |planes, per_cell| IntegrationOptions {
+        planes,
+        per_cell,
+        table: Some([64; 3]),
+        texels,
+        ..IntegrationOptions::of(Form::Cylindrical)
+    };
     println!("  {:44} {:>8}", "", "frames/s");
     for (name, choice, projection) in [
         ("3D texture", volume, projection),
@@ -141,8 +151,8 @@ fn tiles_against_volumes(mut renderer: Renderer) {
         ("tiles, one plane of each cell", tiles(Planes::One, true), projection),
         ("tiles, two planes of each fragment", tiles(Planes::Two, false), projection),
         ("tiles with two triangles", tiles(Planes::Packed, true), projection),
-        ("exact", Choice::default(), projection),
-        ("exact, intersected, 32-bit floats", Choice::default(), ProjectionOptions::default()),
+        ("exact", IntegrationOptions::default(), projection),
+        ("exact, intersected, 32-bit floats", IntegrationOptions::default(), ProjectionOptions::default()),
     ] {
         renderer.set_projection(projection);
         renderer.set_integral(choice);
@@ -192,7 +202,7 @@ fn sorts_and_data(mut renderer: Renderer) {
         let opacity = vec![(at(0.0), 0.0), (at(0.3), 0.1), (at(0.45), 0.6), (at(0.6), 0.1), (at(1.0), 0.8)];
         let unit = (high - low).length() / 10.0;
         renderer.set_transfer(&TransferFunction::new(color, opacity, unit).expect("a function"));
-        renderer.set_integral(Choice::of(Form::Polynomial));
+        renderer.set_integral(IntegrationOptions::of(Form::Polynomial));
         println!("  {name}, {count} tetrahedra");
         let mut numeric = None;
         for (sort, order) in [

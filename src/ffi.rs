@@ -18,8 +18,8 @@ use crate::field::{Association, Component, Field};
 use crate::grid::Grid;
 use crate::host::{Log, Session, carried, guard, named};
 use crate::image::{Backdrop, Image};
-use crate::integral::Choice;
-use crate::integral::choice::Form;
+use crate::integral::IntegrationOptions;
+use crate::integral::options::Form;
 use crate::memory;
 use crate::mesh::{Array, Cells, Mesh, Polyhedra};
 use bridge::{FieldSpec, IntegralSpec, Numbers, Stats, TransferSpec, Type, ViewSpec};
@@ -298,9 +298,9 @@ fn set_integral(session: &mut Session, spec: IntegralSpec) -> Result<()> {
 }
 
 /// What the form reads of a specification, and nothing else of it.
-fn choice(spec: &IntegralSpec) -> Result<Choice> {
+fn choice(spec: &IntegralSpec) -> Result<IntegrationOptions> {
     let form = named("integral", spec.form)?;
-    let mut choice = Choice::of(form);
+    let mut choice = IntegrationOptions::of(form);
     if form == Form::Exact {
         return Ok(choice);
     }

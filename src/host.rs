@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::field::Field;
 use crate::gpu::DeviceChoice;
 use crate::image::Image;
-use crate::integral::Choice;
+use crate::integral::IntegrationOptions;
 use crate::mesh::Mesh;
 use crate::mesh::cells::Tetrahedra;
 use crate::project::ProjectionOptions;
@@ -112,7 +112,7 @@ impl Session {
     ///
     /// # Errors
     /// [`Error::Render`] if there can be no table of that form. What the form does not read is not judged.
-    pub fn set_integral(&mut self, choice: Choice) -> Result<()> {
+    pub fn set_integral(&mut self, choice: IntegrationOptions) -> Result<()> {
         choice.check(choice.size(0))?;
         self.renderer.set_integral(choice);
         Ok(())

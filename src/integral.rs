@@ -14,21 +14,21 @@
 //! as accurate as f32 can tell; pieces of great optical depth are first cut where nothing more can be seen.
 
 mod batch;
-pub mod choice;
 pub(crate) mod cubic;
 mod knots;
 pub mod lookup;
+pub mod options;
 pub(crate) mod second;
 pub mod table;
 #[cfg(test)]
 mod tests;
 
 pub use batch::Batch;
-pub use choice::{Choice, Form};
 pub(crate) use knots::BUCKETS;
 pub use knots::Knots;
 pub(crate) use knots::Line;
 pub use lookup::{Integral, Lookup};
+pub use options::{Form, IntegrationOptions};
 
 use crate::field::{Kind, Normalization};
 use crate::real::Real;

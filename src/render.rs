@@ -23,7 +23,7 @@ use crate::gpu::Part;
 use crate::gpu::table::builds;
 use crate::gpu::{DeviceChoice, Gpu};
 use crate::image::Image;
-use crate::integral::{Choice, Exact, Form, lookup};
+use crate::integral::{Exact, Form, IntegrationOptions, lookup};
 use crate::memory;
 use crate::mesh::Mesh;
 use crate::mesh::cells::Tetrahedra;
@@ -69,7 +69,7 @@ pub struct Renderer {
     extra: Extra,
     /// The engine that was said to draw neither.
     lacking: Option<&'static str>,
-    integral: Choice,
+    integral: IntegrationOptions,
     tables: Tables,
     /// What of a table is needed, once that is known: none for the exact integral.
     key: Option<Option<Arc<Key>>>,
@@ -134,7 +134,7 @@ impl Renderer {
             exact: None,
             extra: Extra::default(),
             lacking: None,
-            integral: Choice::default(),
+            integral: IntegrationOptions::default(),
             tables: Tables::default(),
             key: None,
             waits: true,
@@ -197,7 +197,7 @@ impl Renderer {
 
     /// Integrates segments in another form from now on. The next frame waits for its table, if one was named; with
     /// [`Form::Auto`] frames are exact until there is a table.
-    pub fn set_integral(&mut self, integral: Choice) {
+    pub fn set_integral(&mut self, integral: IntegrationOptions) {
         if self.integral != integral {
             self.integral = integral;
             // Values may have to be in the range of tables.
@@ -453,9 +453,9 @@ impl Renderer {
         let late = key.as_ref().filter(|_| view.blend() == Blend::Composite && built.is_none()).cloned();
         let (mesh, table) = (&*mesh, built.as_ref().map(|b| &b.table));
         self.waits = false;
-        self.stats.integral = table.map_or(Form::Exact, |t| t.choice().form).name().into();
+        self.stats.integral = table.map_or(Form::Exact, |t| t.options().form).name().into();
         self.stats.table_ms = built.as_ref().map_or(0.0, |b| b.ms);
-        self.stats.table_bytes = table.map_or(0, |t| Choice::bytes(t.size()));
+        self.stats.table_bytes = table.map_or(0, |t| IntegrationOptions::bytes(t.size()));
         // What draws by itself is exact: variants are for those who ask for the projection.
         let none = ProjectionOptions::default();
         let projection = if self.engine == Engine::Auto { &none } else { &self.projection };

@@ -11,7 +11,7 @@ use glam::{DMat3, DVec3, dvec3};
 use halite::field::{Association, Component, Field};
 use halite::host::Log;
 use halite::image::Image;
-use halite::integral::choice::{Choice, Form};
+use halite::integral::options::{Form, IntegrationOptions};
 use halite::mesh::cells::Tetrahedra;
 use halite::mesh::{Array, Mesh, Values, generate};
 use halite::render::{self, Renderer};
@@ -134,7 +134,7 @@ fn tables_are_for_what_the_function_tells() {
         for form in [Form::Volume, Form::Polynomial, Form::Cylindrical] {
             let errors = [&scene, &outliers].map(|scene| {
                 let expected = Engine::Reference.image(scene, &view(Blend::Composite));
-                renderer.set_integral(Choice::of(form));
+                renderer.set_integral(IntegrationOptions::of(form));
                 set(&mut renderer, scene);
                 renderer.render(&view(Blend::Composite), &|_| ()).unwrap().compare(&expected).unwrap().max
             });

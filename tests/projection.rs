@@ -9,7 +9,7 @@ use common::{Engine, Report, Scene, rounds, set};
 use glam::{DVec3, dvec3};
 use halite::field::Association;
 use halite::image::Image;
-use halite::integral::choice::{Choice, Form, Texels};
+use halite::integral::options::{Form, IntegrationOptions, Texels};
 use halite::integral::table::Kind;
 use halite::mesh::{Array, Mesh, Values, generate};
 use halite::project::{Compositing, Cycles, Fragments, Order, ProjectionOptions, Target, Thickness};
@@ -233,7 +233,7 @@ fn perspective_interpolation_cures_linear() {
 }
 
 /// The errors of tables of three parameters in a scene, against the judge.
-fn table_errors<const N: usize>((scene, view): &(Scene, View), volumes: [Choice; N]) -> Option<[f64; N]> {
+fn table_errors<const N: usize>((scene, view): &(Scene, View), volumes: [IntegrationOptions; N]) -> Option<[f64; N]> {
     let mut renderer = renderer()?;
     set(&mut renderer, scene);
     let expected = Engine::Reference.image(scene, view);
@@ -243,8 +243,8 @@ fn table_errors<const N: usize>((scene, view): &(Scene, View), volumes: [Choice;
     }))
 }
 
-fn volume(lengths: Kind, texels: Texels, table: [u32; 3]) -> Choice {
-    Choice { lengths, texels, table: Some(table), ..Choice::of(Form::Volume) }
+fn volume(lengths: Kind, texels: Texels, table: [u32; 3]) -> IntegrationOptions {
+    IntegrationOptions { lengths, texels, table: Some(table), ..IntegrationOptions::of(Form::Volume) }
 }
 
 #[test]
@@ -409,7 +409,7 @@ fn what_it_cannot_draw_it_says() {
     renderer.set_integral(volume(Kind::Log, Texels::Float, [1, 1, 1]));
     let table = renderer.render(&view, &|_| ()).unwrap_err();
     assert!(table.to_string().contains("table"), "{table}");
-    renderer.set_integral(Choice::default());
+    renderer.set_integral(IntegrationOptions::default());
     assert!(image(&mut renderer, ProjectionOptions::default(), &view).pixels.iter().any(|p| p[3] > 0.1));
 }
 

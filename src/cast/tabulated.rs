@@ -71,7 +71,7 @@ impl<'a> Tabulated<'a> {
             (_, 0) => [front, f64::midpoint(front, middle), middle],
             _ => [middle, f64::midpoint(middle, back), back],
         };
-        let one = self.lookup.choice().form == Form::SecondOrder;
+        let one = self.lookup.options().form == Form::SecondOrder;
         if one && length < self.lookup.longest() * (1.0 - SHORTER) || !samples.iter().all(|s| s.is_finite()) {
             return [0.0; 4];
         }

@@ -5,8 +5,8 @@ use super::buffers::Buffer;
 use super::construct::{Builder, Texels as BuiltTexels};
 use super::raster::{Slot, Texture};
 use crate::error::{Error, Result};
-use crate::integral::choice::{Alpha, Build, Choice, Form, Planes, Texels};
 use crate::integral::lookup::{Range, Stored};
+use crate::integral::options::{Alpha, Build, Form, IntegrationOptions, Planes, Texels};
 use crate::integral::table::{Cylindrical, Kind, length};
 use crate::integral::{Exact, Lookup};
 use bytemuck::{Pod, Zeroable};
@@ -58,7 +58,7 @@ pub(crate) fn constants(table: Option<&Lookup>, per_cell: bool) -> String {
         // Devices have no slabs of three samples yet, and refuse their tables.
         Some(Stored::SecondOrder(_) | Stored::SecondOrderPolynomial(_)) => "EXACT",
     };
-    let choice = table.map(|t| *t.choice()).unwrap_or_default();
+    let choice = table.map(|t| *t.options()).unwrap_or_default();
     text += &format!(
         "const COLORING = {form};\nconst DEGREE = {}u;\nconst LINEAR_OPACITY = {};\nconst ONE_PLANE = {};\nconst PACKED = {};\n\
          const PLANE_PER_CELL = {};\n",
@@ -139,7 +139,7 @@ fn no_slabs() -> Error {
 }
 
 /// Whether `gpu` is to build the tables of `choice` itself, rather than be handed them.
-pub(crate) fn builds(gpu: &Gpu, choice: &Choice) -> bool {
+pub(crate) fn builds(gpu: &Gpu, choice: &IntegrationOptions) -> bool {
     let wanted = match choice.build {
         Build::Auto => !gpu.adapter.is_software(),
         Build::Host => false,
@@ -179,7 +179,7 @@ impl OnDevice {
     /// [`Error::Device`] if the device does not filter such texels or has no textures so large, and those of
     /// [`Gpu::check`] and [`Buffer::new`].
     pub(crate) fn holding(gpu: &Gpu, table: &Lookup) -> Result<Self> {
-        let format = texel_format(gpu, table.choice().texels)?;
+        let format = texel_format(gpu, table.options().texels)?;
         let on_device = Self::empty(gpu, table, format)?;
         let (OnDevice { volume, layers: (layers, _), .. }, ranges) = (&on_device, table.ranges());
         let mut writer = Writer { gpu, format, pending: 0 };
@@ -196,7 +196,7 @@ impl OnDevice {
                 }
             }
             Stored::Cylindrical(t) => {
-                let tiles = Tiles::new(gpu, t, table.choice().planes == Planes::Packed);
+                let tiles = Tiles::new(gpu, t, table.options().planes == Planes::Packed);
                 for tile in 0..tiles.count {
                     let texels = tiles.texels(t, tile);
                     writer.write(layers, tiles.corner(tile), tiles.tile, &texels, &ranges[0])?;
@@ -263,7 +263,7 @@ impl OnDevice {
             }
             Stored::Polynomial(_) => layered(table.size())?,
             Stored::Cylindrical(t) => {
-                let tiles = Tiles::new(gpu, t, table.choice().planes == Planes::Packed);
+                let tiles = Tiles::new(gpu, t, table.options().planes == Planes::Packed);
                 parameters.tiles = tiles.parameters();
                 layered(tiles.size())?
             }

@@ -3,7 +3,7 @@
 mod components;
 mod texels;
 
-use super::choice::{Alpha, Choice, Form, Planes, Texels};
+use super::options::{Alpha, Form, IntegrationOptions, Planes, Texels};
 use super::table::{
     Cylindrical, Kind, Polynomial, SecondOrder, SecondOrderPolynomial, Slabs, Table, length, mix, parabola,
 };
@@ -40,7 +40,7 @@ pub(crate) enum Stored {
 /// The integral of segments by a table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lookup {
-    choice: Choice,
+    options: IntegrationOptions,
     stored: Stored,
     /// What texels stand for; for polynomials one for each power.
     ranges: Vec<Range>,
@@ -61,29 +61,29 @@ pub struct Integral<'a> {
 }
 
 impl Lookup {
-    /// Builds the table that `choice` says, for segments of up to `longest` normalised units, on the current rayon
+    /// Builds the table that `options` say, for segments of up to `longest` normalised units, on the current rayon
     /// pool.
     ///
     /// # Errors
     /// Those of [`check`].
-    pub fn new(exact: &Exact<f64>, choice: &Choice, longest: f64) -> Result<Self> {
+    pub fn new(exact: &Exact<f64>, options: &IntegrationOptions, longest: f64) -> Result<Self> {
         let exact = &*tabulated(exact);
-        let [front, back, depth] = sized(exact, choice, longest)?;
-        let stored = match choice.form {
-            Form::Volume => Table::closed(exact, choice.lengths, [front, back, depth], longest).map(Stored::Volume),
-            Form::Polynomial => Polynomial::closed(exact, choice.degree, front, longest).map(Stored::Polynomial),
+        let [front, back, depth] = sized(exact, options, longest)?;
+        let stored = match options.form {
+            Form::Volume => Table::closed(exact, options.lengths, [front, back, depth], longest).map(Stored::Volume),
+            Form::Polynomial => Polynomial::closed(exact, options.degree, front, longest).map(Stored::Polynomial),
             Form::Cylindrical => Cylindrical::closed(exact, depth, front, longest).map(Stored::Cylindrical),
             Form::SecondOrder => {
-                let in_bytes = choice.texels == Texels::Unorm8;
+                let in_bytes = options.texels == Texels::Unorm8;
                 let build = if in_bytes { SecondOrder::published_in_bytes } else { SecondOrder::published };
-                build(exact, front, longest, choice.iterations).map(Stored::SecondOrder)
+                build(exact, front, longest, options.iterations).map(Stored::SecondOrder)
             }
             Form::SecondOrderPolynomial => {
-                SecondOrderPolynomial::closed(exact, choice.degree, front, longest).map(Stored::SecondOrderPolynomial)
+                SecondOrderPolynomial::closed(exact, options.degree, front, longest).map(Stored::SecondOrderPolynomial)
             }
             Form::Auto | Form::Exact => None,
         };
-        Self::of(exact, choice, stored)
+        Self::of(exact, options, stored)
     }
 
     /// The same, in the memory of `old` where that fits, which need not be had anew: where pages are small, that takes
@@ -91,11 +91,11 @@ impl Lookup {
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub(crate) fn renewed(old: Self, exact: &Exact<f64>, choice: &Choice, longest: f64) -> Result<Self> {
+    pub(crate) fn renewed(old: Self, exact: &Exact<f64>, options: &IntegrationOptions, longest: f64) -> Result<Self> {
         let exact = &*tabulated(exact);
-        let fits = old.choice == *choice && old.longest() == longest && old.source.is_none();
-        if !fits || old.size() != sized(exact, choice, longest)? {
-            return Self::new(exact, choice, longest);
+        let fits = old.options == *options && old.longest() == longest && old.source.is_none();
+        if !fits || old.size() != sized(exact, options, longest)? {
+            return Self::new(exact, options, longest);
         }
         let stored = match old.stored {
             Stored::Volume(mut t) => {
@@ -114,20 +114,20 @@ impl Lookup {
                 t.rebuild(exact);
                 Stored::SecondOrderPolynomial(t)
             }
-            Stored::Cylindrical(_) => return Self::new(exact, choice, longest),
+            Stored::Cylindrical(_) => return Self::new(exact, options, longest),
         };
-        Self::of(exact, choice, Some(stored))
+        Self::of(exact, options, Some(stored))
     }
 
     /// The same table, without texels: those are for a device to build.
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub(crate) fn outline(exact: &Exact<f64>, choice: &Choice, longest: f64) -> Result<Self> {
+    pub(crate) fn outline(exact: &Exact<f64>, options: &IntegrationOptions, longest: f64) -> Result<Self> {
         let exact = &*tabulated(exact);
-        let [front, back, depth] = sized(exact, choice, longest)?;
-        let (direct, kind, degree) = (exact.direct, choice.lengths, choice.degree);
-        let stored = match choice.form {
+        let [front, back, depth] = sized(exact, options, longest)?;
+        let (direct, kind, degree) = (exact.direct, options.lengths, options.degree);
+        let stored = match options.form {
             Form::Volume => {
                 Some(Stored::Volume(Table { kind, size: [front, back, depth], longest, direct, texels: vec![].into() }))
             }
@@ -140,11 +140,11 @@ impl Lookup {
             }
             Form::Auto | Form::Exact | Form::SecondOrder | Form::SecondOrderPolynomial => None,
         };
-        let choice = Choice { texels: Texels::Float, ..*choice };
-        Ok(Lookup { source: Some(Box::new(exact.clone())), ..Self::of(exact, &choice, stored)? })
+        let options = IntegrationOptions { texels: Texels::Float, ..*options };
+        Ok(Lookup { source: Some(Box::new(exact.clone())), ..Self::of(exact, &options, stored)? })
     }
 
-    fn of(exact: &Exact<f64>, choice: &Choice, stored: Option<Stored>) -> Result<Self> {
+    fn of(exact: &Exact<f64>, options: &IntegrationOptions, stored: Option<Stored>) -> Result<Self> {
         let stored = stored.ok_or_else(|| Error::Render("the exact integral has no table".into()))?;
         let unit = match &stored {
             Stored::Volume(t) if t.kind != Kind::Uniform => length(t.kind, t.size[2], t.longest, 1),
@@ -155,14 +155,15 @@ impl Lookup {
             | Stored::Cylindrical(Cylindrical { longest, .. }) => *longest,
         };
         let inverse = (1.0 / unit) as f32;
-        let mut table = Lookup { choice: *choice, ranges: vec![], stored, direct: exact.direct, inverse, source: None };
+        let mut table =
+            Lookup { options: *options, ranges: vec![], stored, direct: exact.direct, inverse, source: None };
         table.round();
         Ok(table)
     }
 
     /// Rounds texels to what they are stored as.
     fn round(&mut self) {
-        let levels = match self.choice.texels {
+        let levels = match self.options.texels {
             Texels::Float => 0.0,
             Texels::Unorm16 => 65535.0,
             Texels::Unorm8 => 255.0,
@@ -253,8 +254,8 @@ impl Lookup {
     }
 
     /// What was chosen.
-    pub fn choice(&self) -> &Choice {
-        &self.choice
+    pub fn options(&self) -> &IntegrationOptions {
+        &self.options
     }
 
     /// The function of which a device builds the texels, if these are not here.
@@ -286,7 +287,7 @@ impl Lookup {
         match &self.stored {
             Stored::SecondOrder(t) => t.bytes(),
             Stored::SecondOrderPolynomial(t) => t.bytes(),
-            _ => Choice::bytes(self.size()),
+            _ => IntegrationOptions::bytes(self.size()),
         }
     }
 
@@ -346,7 +347,7 @@ impl Lookup {
                 let at = a * t.planes as f32;
                 let (i, j, area) = (between(s, t.size), between(b, t.size), (t.size * t.size) as usize);
                 let plane = |k: usize| bilinear(&t.texels[k % t.planes as usize * area..], t.size, i, j);
-                if self.choice.planes == Planes::One {
+                if self.options.planes == Planes::One {
                     return plane((at + 0.5) as usize);
                 }
                 let low = (at as usize).min(t.planes as usize - 1);
@@ -389,8 +390,8 @@ impl Lookup {
 
     /// Colour and opacity of a segment, from its colour over what is seen of it and its mean extinction.
     fn reconstructed(&self, [r, g, b, density]: [f32; 4], length: f32) -> [f32; 4] {
-        let alpha = match self.choice {
-            Choice { form: Form::Polynomial, alpha: Alpha::Linear, .. } => {
+        let alpha = match self.options {
+            IntegrationOptions { form: Form::Polynomial, alpha: Alpha::Linear, .. } => {
                 opacity_of_depth(density / self.inverse) * (length * self.inverse).min(1.0)
             }
             _ => opacity_of_depth(density * length),
@@ -437,21 +438,23 @@ fn tabulated(exact: &Exact<f64>) -> Cow<'_, Exact<f64>> {
     exact.weights().map_or(Cow::Borrowed(exact), Cow::Owned)
 }
 
-/// Texels along the axes of the table that `choice` says: where nobody said how many, by the bounds of its error.
-fn sized(exact: &Exact<f64>, choice: &Choice, longest: f64) -> Result<[u32; 3]> {
-    let mut size = choice.size(exact.opacity.len());
-    check(choice, size, exact.kind)?;
-    if choice.table.is_none() {
+/// Texels along the axes of the table that `options` say: where nobody said how many, by the bounds of its error.
+fn sized(exact: &Exact<f64>, options: &IntegrationOptions, longest: f64) -> Result<[u32; 3]> {
+    let mut size = options.size(exact.opacity.len());
+    check(options, size, exact.kind)?;
+    if options.table.is_none() {
         let [front, _, depth] = size;
         // Fewer values than the knots ask for, where that is known to be enough.
-        let fewer = match (choice.form, choice.lengths) {
-            (Form::Polynomial, _) => table::values_of_polynomial(exact, choice.degree, longest, SMALL_ERROR, front / 2),
+        let fewer = match (options.form, options.lengths) {
+            (Form::Polynomial, _) => {
+                table::values_of_polynomial(exact, options.degree, longest, SMALL_ERROR, front / 2)
+            }
             (Form::Volume, Kind::LogNormalised) => {
                 table::values_of_normalised(exact, depth, longest, SMALL_ERROR, front / 2)
             }
             _ => None,
         };
-        size = match (choice.form, choice.lengths, fewer) {
+        size = match (options.form, options.lengths, fewer) {
             (Form::Volume, Kind::Uniform, _) => table::size(exact, longest, UNIFORM_ERROR).unwrap_or(size),
             (_, _, Some(fewer)) => [fewer, fewer, depth],
             _ => size,
@@ -460,17 +463,17 @@ fn sized(exact: &Exact<f64>, choice: &Choice, longest: f64) -> Result<[u32; 3]> 
     Ok(size)
 }
 
-/// Whether `choice` can be drawn with, of that size and for fields of this kind.
+/// Whether `options` can be drawn with, of that size and for fields of this kind.
 ///
 /// # Errors
-/// Those of [`Choice::check`]; [`Error::Render`] for a table of parabolas of fields of several components.
-pub fn check(choice: &Choice, size: [u32; 3], kind: field::Kind) -> Result<()> {
-    if kind != field::Kind::Scalar && choice.form.is_of_second_order() {
+/// Those of [`IntegrationOptions::check`]; [`Error::Render`] for a table of parabolas of fields of several components.
+pub fn check(options: &IntegrationOptions, size: [u32; 3], kind: field::Kind) -> Result<()> {
+    if kind != field::Kind::Scalar && options.form.is_of_second_order() {
         return Err(Error::Render(
             "tables of parabolas are for fields of one component; use the exact integral".into(),
         ));
     }
-    choice.check(size)
+    options.check(size)
 }
 
 #[cfg(test)]

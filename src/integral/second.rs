@@ -26,7 +26,7 @@ mod segmented;
 mod special;
 
 use super::Light as Gathered;
-use super::choice::{Method, Two};
+use super::options::{Method, Two};
 use crate::field::Normalization;
 use crate::transfer::bivariate::{Shape, Source, Table, Wave, Widget};
 use crate::transfer::shading::{Light, Shading};

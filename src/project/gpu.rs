@@ -237,7 +237,7 @@ impl Project {
         let variant = Variant { kind: exact.kind, direct: exact.direct };
         let mut limits = seen.limits();
         // In parallel views all segments of a cell are on one plane.
-        let one_plane = table.is_some_and(|t| t.choice().per_cell) || view.eye().is_none();
+        let one_plane = table.is_some_and(|t| t.options().per_cell) || view.eye().is_none();
         limits.plane_per_cell = one_plane && options.fragments != Fragments::Intersected;
         let drawn = Drawn { options, blend: view.blend() };
         let source = program(&variant, association, drawn, &layout, table.map(|t| &**t), limits, &arrays);

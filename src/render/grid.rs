@@ -13,7 +13,7 @@ use crate::field::{Field, Kind, Normalization};
 use crate::gpu::Part;
 use crate::grid::Grid;
 use crate::image::Image;
-use crate::integral::{Choice, Exact, Form, lookup};
+use crate::integral::{Exact, Form, IntegrationOptions, lookup};
 use crate::transfer::TransferFunction;
 use crate::view::{Blend, View};
 use second::Extra;
@@ -59,7 +59,7 @@ impl OnGrid {
     /// What is needed of a table; nothing for the integral itself.
     fn key(
         &mut self,
-        choice: &Choice,
+        choice: &IntegrationOptions,
         transfer: &TransferFunction,
         how: Reconstruction,
         volume: &Volume,
@@ -222,7 +222,7 @@ impl Renderer {
         stats.device_bytes = grid.volume.bytes() + field.samples.bytes() + field.extra.bytes();
         (stats.steps, stats.repaired_rays, stats.cpu_rays) = (steps, 0, 0);
         let own = if of_two { self.integral.two.method.name() } else { Form::Exact.name() };
-        stats.integral = built.as_ref().map_or(own, |b| b.table.choice().form.name()).into();
+        stats.integral = built.as_ref().map_or(own, |b| b.table.options().form.name()).into();
         stats.table_ms = built.as_ref().map_or(0.0, |b| b.ms);
         stats.table_bytes = built.as_ref().map_or(0, |b| b.table.bytes());
         (stats.device_ms, stats.projection, stats.sweep, stats.uploaded_bytes) = (None, None, None, 0);

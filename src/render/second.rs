@@ -8,7 +8,7 @@ use crate::field::normalization::MOST;
 use crate::field::{Association, Field, Gradient, Kind, Normalization};
 use crate::geometry::{TetMesh, Values};
 use crate::image::Image;
-use crate::integral::choice::{Culling, Two};
+use crate::integral::options::{Culling, Two};
 use crate::integral::second::{LONGEST, Pairs, Second, places};
 use crate::transfer::TransferFunction;
 use crate::transfer::bivariate::{Bivariate, Source};

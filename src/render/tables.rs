@@ -7,7 +7,7 @@
 use super::Renderer;
 use crate::error::{Error, Result};
 use crate::geometry::{TetMesh, Values};
-use crate::integral::{Choice, Exact, Lookup};
+use crate::integral::{Exact, IntegrationOptions, Lookup};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::time::Instant;
@@ -19,7 +19,7 @@ const SAMPLES: usize = 1 << 16;
 #[derive(Debug, PartialEq)]
 pub(super) struct Key {
     pub(super) exact: Exact<f64>,
-    pub(super) choice: Choice,
+    pub(super) choice: IntegrationOptions,
     pub(super) longest: f64,
     /// The device that draws builds it.
     pub(super) on_device: bool,

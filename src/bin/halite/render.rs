@@ -10,7 +10,7 @@ use halite::cast::{Order, Reconstruction, Sampling};
 use halite::field::{Association, Component, Field, Kind};
 use halite::gpu::DeviceChoice;
 use halite::grid::Grid;
-use halite::integral::choice::{Choice, Form};
+use halite::integral::options::{Form, IntegrationOptions};
 use halite::io::Time;
 use halite::mesh::{Mesh, cells::Tetrahedra};
 use halite::project::ProjectionOptions;
@@ -397,8 +397,8 @@ impl Request {
     }
 
     /// The form of the integral that was asked for.
-    pub(crate) fn choice(&self, scene: Option<&Scene>) -> Result<Choice> {
-        let choice = scene.map_or(Ok(Choice::default()), |s| integral::of_scene(s, &self.input))?;
+    pub(crate) fn choice(&self, scene: Option<&Scene>) -> Result<IntegrationOptions> {
+        let choice = scene.map_or(Ok(IntegrationOptions::default()), |s| integral::of_scene(s, &self.input))?;
         let choice = self.integral.apply(choice);
         self.integral.check(&choice)?;
         Ok(choice)
@@ -415,9 +415,9 @@ impl Request {
             let given = given.join(", ");
             return Err(output::misuse(format!("study draws all variants, and leaves no choice by {given}")));
         }
-        let choice = scene.map_or(Ok(Choice::default()), |s| integral::of_scene(s, &self.input))?;
+        let choice = scene.map_or(Ok(IntegrationOptions::default()), |s| integral::of_scene(s, &self.input))?;
         let choice = self.integral.apply(choice);
-        self.integral.check(&Choice { form: Form::Volume, ..choice })?;
+        self.integral.check(&IntegrationOptions { form: Form::Volume, ..choice })?;
         let left: Vec<_> = scene.map_or(vec![], |s| {
             let said = [("projection", s.projection.is_some()), ("integral", s.integral.is_some())];
             said.into_iter().filter_map(|(key, said)| said.then_some(key)).collect()

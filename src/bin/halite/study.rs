@@ -12,7 +12,7 @@ use embedded_graphics::prelude::{DrawTarget, Drawable, OriginDimensions, Pixel, 
 use embedded_graphics::text::{Baseline, Text};
 use halite::gpu::DeviceChoice;
 use halite::image::{Backdrop, Image};
-use halite::integral::choice::{Choice, Form, Texels};
+use halite::integral::options::{Form, IntegrationOptions, Texels};
 use halite::integral::table::Kind;
 use halite::project::{Fragments, Order, ProjectionOptions, Target, Thickness};
 use halite::render::Renderer;
@@ -63,7 +63,7 @@ struct Variant {
     name: &'static str,
     place: &'static str,
     projection: ProjectionOptions,
-    integral: Choice,
+    integral: IntegrationOptions,
 }
 
 /// What a variant gave.
@@ -91,13 +91,14 @@ const LINES: usize = 24;
 /// From the fewest enhancements to the most, then what else can be switched; with tables of this size, if it was said.
 fn variants(table: Option<[u32; 3]>) -> Vec<Variant> {
     let best = ProjectionOptions::default();
-    let volume = |lengths, texels| Choice { lengths, texels, table, ..Choice::of(Form::Volume) };
+    let volume =
+        |lengths, texels| IntegrationOptions { lengths, texels, table, ..IntegrationOptions::of(Form::Volume) };
     let (uniform, log) = (volume(Kind::Uniform, Texels::Unorm16), volume(Kind::Log, Texels::Unorm16));
     let interpolated = ProjectionOptions { fragments: Fragments::Interpolated, ..best };
     let linear = ProjectionOptions { fragments: Fragments::Linear, ..best };
     let eight = |projection| ProjectionOptions { target: Target::Rgba8, ..projection };
     let frame_buffer = eight(interpolated);
-    let exact = Choice::default();
+    let exact = IntegrationOptions::default();
     let variant = |name, place, projection, integral| Variant { name, place, projection, integral };
     vec![
         variant("basic", "table 1 i", eight(linear), volume(Kind::Uniform, Texels::Unorm8)),

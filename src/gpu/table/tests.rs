@@ -5,8 +5,8 @@ use crate::field;
 use crate::gpu::raster::{self, Readback};
 use crate::gpu::shader::{self, Variant};
 use crate::gpu::testing::{gpu, validated};
-use crate::integral::choice::{Choice, Form};
 use crate::integral::lookup::tests::{choices, exact, segments, transfer, worst};
+use crate::integral::options::{Form, IntegrationOptions};
 use crate::transfer::Emission;
 use wgpu::naga;
 
@@ -83,7 +83,7 @@ fn devices_look_up_as_f64_does() {
                 if texel_format(&gpu, texels).is_err() || choice.planes == Planes::One {
                     continue;
                 }
-                let choice = Choice { texels, ..choice };
+                let choice = IntegrationOptions { texels, ..choice };
                 let table = Lookup::new(&exact(emission), &choice, 2.0).unwrap();
                 let got = looked_up(&gpu, &table, emission != Emission::Chromatic, &segments);
                 let worst = worst(&table, &segments, &got);
@@ -118,10 +118,10 @@ fn devices_look_up_what_they_built() {
         );
         let function = crate::gpu::function::upload(&gpu, &narrow).unwrap();
         let builder = Builder::new(&gpu, direct).unwrap();
-        let volumes = [Kind::Uniform, Kind::Log, Kind::LogNormalised].map(|lengths| Choice {
+        let volumes = [Kind::Uniform, Kind::Log, Kind::LogNormalised].map(|lengths| IntegrationOptions {
             lengths,
             table: Some([17, 17, 8]),
-            ..Choice::of(Form::Volume)
+            ..IntegrationOptions::of(Form::Volume)
         });
         for choice in choices().into_iter().filter(|c| c.planes == Planes::Two).chain(volumes) {
             let table = Lookup::outline(&exact, &choice, 2.0).unwrap();
@@ -144,7 +144,11 @@ fn devices_look_up_what_they_built() {
 #[test]
 fn one_plane_is_read_as_on_the_host() {
     let Some(gpu) = gpu() else { return };
-    let choice = Choice { planes: Planes::One, table: Some([15, 15, 24]), ..Choice::of(Form::Cylindrical) };
+    let choice = IntegrationOptions {
+        planes: Planes::One,
+        table: Some([15, 15, 24]),
+        ..IntegrationOptions::of(Form::Cylindrical)
+    };
     if texel_format(&gpu, choice.texels).is_err() {
         return;
     }

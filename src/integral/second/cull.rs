@@ -221,7 +221,7 @@ impl Second {
 mod tests {
     use super::*;
     use crate::field::Normalization;
-    use crate::integral::choice::Two;
+    use crate::integral::options::Two;
     use crate::reference::segment_of_two;
     use crate::transfer::bivariate::{OPEN, Widget};
     use crate::transfer::{Bivariate, TransferFunction};

@@ -1,7 +1,7 @@
 //! Segments against the reference's.
 
 use super::*;
-use crate::integral::choice::Weights;
+use crate::integral::options::Weights;
 use crate::reference::segment_of_two;
 use crate::transfer::bivariate::{OPEN, Sine, Wave};
 use rayon::prelude::*;

@@ -4,7 +4,7 @@ use crate::cast::second::{self, Two, spreads};
 use crate::cast::{Frame, Gradients, Samples, Volume};
 use crate::error::{Error, Result};
 use crate::field::{Association, Field, Normalization};
-use crate::integral::choice;
+use crate::integral::options;
 use crate::integral::second::Second;
 use crate::transfer::TransferFunction;
 
@@ -37,7 +37,7 @@ impl Extra {
         samples: &Samples,
         field: &Field,
         transfer: &TransferFunction,
-        how: choice::Two,
+        how: options::Two,
     ) -> Result<()> {
         if let (None, Some(array)) = (&self.array, field.second()) {
             self.array = Some(Samples::new(volume, array)?);

@@ -6,7 +6,7 @@ use crate::{output, progress};
 use anyhow::{Context, Result};
 use halite::gpu::DeviceChoice;
 use halite::image::{Backdrop, Image};
-use halite::integral::choice::{Alpha, Choice, Form, Planes};
+use halite::integral::options::{Alpha, Form, IntegrationOptions, Planes};
 use halite::integral::table::Kind;
 use halite::project::{Fragments, ProjectionOptions};
 use halite::render::{Engine, Renderer, Stats};
@@ -25,30 +25,33 @@ struct Line {
 }
 
 /// All forms, of tables of this size if it was said; or those that are of interest where fragments are interpolated.
-fn forms(interpolated: bool, table: Option<[u32; 3]>) -> Vec<(&'static str, Choice)> {
-    let volume =
-        |lengths, slices| Choice { lengths, table: table.or(Some([256, 256, slices])), ..Choice::of(Form::Volume) };
-    let polynomial = |degree| Choice { degree, table, ..Choice::of(Form::Polynomial) };
-    let cylindrical = |planes, per_cell| Choice {
+fn forms(interpolated: bool, table: Option<[u32; 3]>) -> Vec<(&'static str, IntegrationOptions)> {
+    let volume = |lengths, slices| IntegrationOptions {
+        lengths,
+        table: table.or(Some([256, 256, slices])),
+        ..IntegrationOptions::of(Form::Volume)
+    };
+    let polynomial = |degree| IntegrationOptions { degree, table, ..IntegrationOptions::of(Form::Polynomial) };
+    let cylindrical = |planes, per_cell| IntegrationOptions {
         planes,
         per_cell,
         table: table.or(Some([PLANES; 3])),
-        ..Choice::of(Form::Cylindrical)
+        ..IntegrationOptions::of(Form::Cylindrical)
     };
     let two = |per_cell| cylindrical(Planes::Two, per_cell);
     if interpolated {
         return vec![
-            ("exact, interpolated", Choice::default()),
+            ("exact, interpolated", IntegrationOptions::default()),
             ("cylindrical, interpolated", two(false)),
             ("cylindrical, plane per cell", two(true)),
         ];
     }
     vec![
-        ("exact", Choice::default()),
+        ("exact", IntegrationOptions::default()),
         ("volume, uniform", volume(Kind::Uniform, 64)),
         ("volume, log", volume(Kind::Log, 16)),
         ("volume, log-normalised", volume(Kind::LogNormalised, 16)),
-        ("polynomial, linear alpha", Choice { alpha: Alpha::Linear, ..polynomial(1) }),
+        ("polynomial, linear alpha", IntegrationOptions { alpha: Alpha::Linear, ..polynomial(1) }),
         ("polynomial, degree 1", polynomial(1)),
         ("polynomial, degree 2", polynomial(2)),
         ("polynomial, degree 4", polynomial(4)),

@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 use halite::geometry::TetMesh;
 use halite::gpu::DeviceChoice;
 use halite::image::{Backdrop, Image};
-use halite::integral::choice::Choice;
+use halite::integral::options::IntegrationOptions;
 use halite::mesh::faces::Faces;
 use halite::order::check::{self, Verdict};
 use halite::order::mpvo::{Mpvo, Rule, Sequence};
@@ -114,7 +114,7 @@ fn studied(
             p(i as f64 / ORDERS.len() as f64);
             // Cycles are not left to the walk: what is wrong shows.
             let projection = ProjectionOptions { order, cycles: Cycles::Cut, ..ProjectionOptions::default() };
-            let variant = Variant { name, place, projection, integral: Choice::default() };
+            let variant = Variant { name, place, projection, integral: IntegrationOptions::default() };
             match draw(variant, options.frames, renderer, &view, &truth) {
                 Ok(row) => {
                     let (sequence, verdict) = judge.install(|| judged(&mut mpvo, &geometry, &view, rule));
