@@ -27,7 +27,7 @@ pub use batch::Batch;
 pub(crate) use knots::BUCKETS;
 pub use knots::Knots;
 pub(crate) use knots::Line;
-pub use lookup::{Integral, Lookup};
+pub use lookup::{Integral, PreintegratedTable};
 pub use options::{Form, IntegrationOptions};
 
 use crate::field::{Kind, Normalization};

@@ -3,11 +3,11 @@
 use super::reconstruction::Order;
 use crate::error::{Error, Result};
 use crate::field::Normalization;
-use crate::integral::{Exact, Form, Lookup};
+use crate::integral::{Exact, Form, PreintegratedTable};
 
 /// A table, and what makes its values of a field's.
 pub(crate) struct Tabulated<'a> {
-    lookup: &'a Lookup,
+    lookup: &'a PreintegratedTable,
     /// From values as the caster has them to those of the table: times the first, plus the second.
     map: [f64; 2],
     /// The function over the table's values, for those beyond them.
@@ -51,7 +51,7 @@ pub(crate) fn check(form: Form, order: Order, even: bool) -> Result<()> {
 impl<'a> Tabulated<'a> {
     /// `lookup`, of the function `exact` over values that `of_table` maps, read with samples that `own` maps.
     pub(crate) fn new(
-        lookup: &'a Lookup,
+        lookup: &'a PreintegratedTable,
         exact: &'a Exact<f64>,
         [own, of_table]: [Normalization; 2],
         order: Order,

@@ -9,7 +9,7 @@ use super::shader::{self, Variant};
 use super::{DeviceChoice, Gpu, function};
 use crate::error::Result;
 use crate::field::{self, Normalization};
-use crate::integral::lookup::Stored;
+use crate::integral::lookup::TableData;
 use crate::integral::table::{
     Cylindrical, Kind, Nodes, OPAQUE_DEPTH, Polynomial, Sampling, Steps, THINNEST, Table, length,
 };
@@ -165,12 +165,12 @@ impl Plan {
     }
 
     /// What builds `stored`, whatever its texels are now.
-    fn of(exact: &Exact<f64>, stored: &Stored) -> Option<Self> {
+    fn of(exact: &Exact<f64>, stored: &TableData) -> Option<Self> {
         match stored {
-            Stored::Volume(t) => Plan::volume(exact, t.kind, t.size, t.longest, Construction::Closed),
-            Stored::Polynomial(t) => Plan::polynomial(t.degree, t.size, t.longest),
-            Stored::Cylindrical(t) => Plan::cylindrical(t.planes, t.size, t.longest),
-            Stored::SecondOrder(_) | Stored::SecondOrderPolynomial(_) => None,
+            TableData::Volume(t) => Plan::volume(exact, t.kind, t.size, t.longest, Construction::Closed),
+            TableData::Polynomial(t) => Plan::polynomial(t.degree, t.size, t.longest),
+            TableData::Cylindrical(t) => Plan::cylindrical(t.planes, t.size, t.longest),
+            TableData::SecondOrder(_) | TableData::SecondOrderPolynomial(_) => None,
         }
     }
 }
@@ -224,7 +224,7 @@ impl Builder {
         gpu: &Gpu,
         exact: &Exact<f64>,
         function: &[Buffer; 3],
-        stored: &Stored,
+        stored: &TableData,
     ) -> Result<Option<Texels>> {
         let Some(plan) = Plan::of(exact, stored) else { return Ok(None) };
         let pitch = plan.size.next_multiple_of(ROW);

@@ -21,7 +21,7 @@ use crate::gpu::raster::{self, Slot, Texture};
 use crate::gpu::shader::{Array, Variant};
 use crate::gpu::sort::Sorter;
 use crate::gpu::{DeviceChoice, Gpu, Part, arrays, function, table};
-use crate::integral::{Exact, Lookup};
+use crate::integral::{Exact, PreintegratedTable};
 use crate::order::mpvo::Mpvo;
 use crate::view::{Blend, View};
 use bytemuck::{Pod, Zeroable};
@@ -195,7 +195,7 @@ impl Project {
     ///
     /// # Errors
     /// Those of [`table::Held::prepare`].
-    pub(crate) fn prepare_table(&mut self, exact: &Exact<f32>, table: Option<&Arc<Lookup>>) -> Result<()> {
+    pub(crate) fn prepare_table(&mut self, exact: &Exact<f32>, table: Option<&Arc<PreintegratedTable>>) -> Result<()> {
         let gpu = &self.gpu;
         let function = match self.function.take() {
             Some(function) => function,
@@ -218,7 +218,7 @@ impl Project {
         geometry: &TetMesh,
         values: &Values<N>,
         exact: &Exact<f32>,
-        table: Option<&Arc<Lookup>>,
+        table: Option<&Arc<PreintegratedTable>>,
         view: &View,
         options: &ProjectionOptions,
     ) -> Result<(Vec<[f32; 4]>, Counts)> {

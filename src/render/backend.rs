@@ -6,7 +6,7 @@ use super::stats::{ProjectionStats, SweepStats};
 use crate::error::{Error, Result};
 use crate::geometry::{TetMesh, Values};
 use crate::gpu::{DeviceChoice, Gpu, Part};
-use crate::integral::{Exact, Integral, Lookup};
+use crate::integral::{Exact, Integral, PreintegratedTable};
 use crate::project::cpu::{self as sweep, Sweep};
 use crate::project::{self, ProjectionOptions, gpu::Project};
 use crate::render::Engine;
@@ -167,7 +167,7 @@ impl Backend {
     }
 
     /// Has the device that draws hold `table`, or build it; `wait`s until that is done.
-    pub(super) fn hold(&mut self, exact: &Exact<f32>, table: &Arc<Lookup>, wait: bool) -> Result<()> {
+    pub(super) fn hold(&mut self, exact: &Exact<f32>, table: &Arc<PreintegratedTable>, wait: bool) -> Result<()> {
         let gpu = match self {
             Backend::Walk | Backend::Project(_) => {
                 return Err(Error::Device("there is no device to build a table".into()));

@@ -4,7 +4,7 @@ use super::Progress;
 use super::largest::Largest;
 use super::loaded::Loaded;
 use super::prepared::Prepared;
-use crate::integral::{Exact, Lookup};
+use crate::integral::{Exact, PreintegratedTable};
 use crate::project::ProjectionOptions;
 use crate::transfer::TransferFunction;
 use crate::view::View;
@@ -16,7 +16,7 @@ pub(super) struct Frame<'a> {
     pub(super) field: &'a Prepared,
     pub(super) transfer: &'a TransferFunction,
     pub(super) exact: &'a Exact<f32>,
-    pub(super) table: Option<&'a Arc<Lookup>>,
+    pub(super) table: Option<&'a Arc<PreintegratedTable>>,
     pub(super) view: &'a View,
     pub(super) projection: &'a ProjectionOptions,
     /// Largest values become pixels as [`Largest`] says.

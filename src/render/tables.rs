@@ -7,7 +7,7 @@
 use super::Renderer;
 use crate::error::{Error, Result};
 use crate::geometry::{TetMesh, Values};
-use crate::integral::{Exact, IntegrationOptions, Lookup};
+use crate::integral::{Exact, IntegrationOptions, PreintegratedTable};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::time::Instant;
@@ -28,7 +28,7 @@ pub(super) struct Key {
 /// A table, and the ms that building it took.
 #[derive(Debug, Clone)]
 pub(super) struct Built {
-    pub(super) table: Arc<Lookup>,
+    pub(super) table: Arc<PreintegratedTable>,
     pub(super) ms: f64,
 }
 
@@ -38,19 +38,19 @@ pub(super) struct Tables {
     ready: Option<(Arc<Key>, Built)>,
     building: Option<(Arc<Key>, Receiver<Result<Built>>)>,
     /// The last one, whose memory the next takes.
-    spare: Option<Arc<Lookup>>,
+    spare: Option<Arc<PreintegratedTable>>,
     /// Not the renderer's: frames would wait behind the table's work.
     pool: Option<rayon::ThreadPool>,
 }
 
 impl Key {
-    fn build(&self, spare: Option<Arc<Lookup>>) -> Result<Built> {
+    fn build(&self, spare: Option<Arc<PreintegratedTable>>) -> Result<Built> {
         let start = Instant::now();
         let Key { exact, choice, longest, .. } = self;
         let table = match spare.and_then(Arc::into_inner) {
-            _ if self.on_device => Lookup::outline(exact, choice, *longest),
-            Some(old) => Lookup::renewed(old, exact, choice, *longest),
-            None => Lookup::new(exact, choice, *longest),
+            _ if self.on_device => PreintegratedTable::outline(exact, choice, *longest),
+            Some(old) => PreintegratedTable::renewed(old, exact, choice, *longest),
+            None => PreintegratedTable::new(exact, choice, *longest),
         }?;
         Ok(Built { table: Arc::new(table), ms: start.elapsed().as_secs_f64() * 1e3 })
     }
@@ -61,7 +61,7 @@ impl Tables {
     /// caller that waits.
     ///
     /// # Errors
-    /// Those of [`Lookup::new`].
+    /// Those of [`PreintegratedTable::new`].
     pub(super) fn get(&mut self, key: &Arc<Key>, wait: bool, own: &rayon::ThreadPool) -> Result<Option<Built>> {
         self.collect(key, wait)?;
         if let Some((ready, built)) = &self.ready

@@ -11,7 +11,7 @@ use crate::gpu::rays::{self, FAR};
 use crate::gpu::shader::{self, Array, Variant};
 use crate::gpu::table::{self, TABLE};
 use crate::gpu::{Gpu, Part, arrays, raster};
-use crate::integral::{Exact, Lookup};
+use crate::integral::{Exact, PreintegratedTable};
 use crate::mesh::faces::BOUNDARY;
 use crate::view::{Blend, View};
 use bytemuck::{Pod, Zeroable};
@@ -201,7 +201,7 @@ impl Traverse {
     ///
     /// # Errors
     /// Those of [`table::Held::prepare`].
-    pub(crate) fn prepare_table(&mut self, exact: &Exact<f32>, table: Option<&Arc<Lookup>>) -> Result<()> {
+    pub(crate) fn prepare_table(&mut self, exact: &Exact<f32>, table: Option<&Arc<PreintegratedTable>>) -> Result<()> {
         let function = match self.function.take() {
             Some(function) => function,
             None => function::upload(&self.gpu, exact)?,
@@ -218,7 +218,7 @@ impl Traverse {
         geometry: &TetMesh,
         values: &Values<N>,
         exact: &Exact<f32>,
-        table: Option<&Arc<Lookup>>,
+        table: Option<&Arc<PreintegratedTable>>,
         view: &View,
     ) -> Result<Drawn> {
         self.upload(geometry, values, exact)?;
@@ -391,7 +391,13 @@ impl Clock {
 }
 
 /// The whole program.
-fn program(variant: &Variant, association: &str, blend: Blend, table: Option<&Lookup>, arrays: &[Array]) -> String {
+fn program(
+    variant: &Variant,
+    association: &str,
+    blend: Blend,
+    table: Option<&PreintegratedTable>,
+    arrays: &[Array],
+) -> String {
     let mut text = shader::prelude(variant);
     for (name, value) in [
         ("FAR", f64::from(FAR)),

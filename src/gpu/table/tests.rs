@@ -21,21 +21,21 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     outcomes[id.x] = looked_up(c.x, c.y, c.z);
 }";
 
-fn source(table: &Lookup, direct: bool) -> String {
+fn source(table: &PreintegratedTable, direct: bool) -> String {
     let variant = Variant { kind: field::Kind::Scalar, direct };
     let constants = constants(Some(table), false) + &declarations(2, 0);
     [&shader::prelude(&variant), &constants, shader::INTEGRAL, TABLE, MAIN].join("\n")
 }
 
 /// What the device looks up.
-fn looked_up(gpu: &Gpu, table: &Lookup, direct: bool, segments: &[[f32; 3]]) -> Vec<[f32; 4]> {
+fn looked_up(gpu: &Gpu, table: &PreintegratedTable, direct: bool, segments: &[[f32; 3]]) -> Vec<[f32; 4]> {
     let on_device = OnDevice::holding(gpu, table).unwrap();
     looked_up_in(gpu, (table, &on_device), direct, segments)
 }
 
 fn looked_up_in(
     gpu: &Gpu,
-    (table, on_device): (&Lookup, &OnDevice),
+    (table, on_device): (&PreintegratedTable, &OnDevice),
     direct: bool,
     segments: &[[f32; 3]],
 ) -> Vec<[f32; 4]> {
@@ -65,7 +65,7 @@ fn looked_up_in(
 
 #[test]
 fn layouts_match_their_rust_twins() {
-    let table = Lookup::new(&exact(Emission::Chromatic), &choices()[0], 2.0).unwrap();
+    let table = PreintegratedTable::new(&exact(Emission::Chromatic), &choices()[0], 2.0).unwrap();
     let module = validated(&source(&table, false));
     let (_, t) = module.types.iter().find(|(_, t)| t.name.as_deref() == Some("Table")).unwrap();
     let naga::TypeInner::Struct { span, members } = &t.inner else { panic!("no struct") };
@@ -84,7 +84,7 @@ fn devices_look_up_as_f64_does() {
                     continue;
                 }
                 let choice = IntegrationOptions { texels, ..choice };
-                let table = Lookup::new(&exact(emission), &choice, 2.0).unwrap();
+                let table = PreintegratedTable::new(&exact(emission), &choice, 2.0).unwrap();
                 let got = looked_up(&gpu, &table, emission != Emission::Chromatic, &segments);
                 let worst = worst(&table, &segments, &got);
                 // Filters of real devices round their weights to 8 bits; llvmpipe's of 8-bit texels round what they
@@ -124,7 +124,7 @@ fn devices_look_up_what_they_built() {
             ..IntegrationOptions::of(Form::Volume)
         });
         for choice in choices().into_iter().filter(|c| c.planes == Planes::Two).chain(volumes) {
-            let table = Lookup::outline(&exact, &choice, 2.0).unwrap();
+            let table = PreintegratedTable::outline(&exact, &choice, 2.0).unwrap();
             let on_device = OnDevice::building(&gpu, &table, &exact, &builder, &function);
             let [front, back, _] = table.size();
             if front != back || choice.degree > 4 {
@@ -132,7 +132,7 @@ fn devices_look_up_what_they_built() {
                 continue;
             }
             let got = looked_up_in(&gpu, (&table, &on_device.unwrap()), direct, &segments);
-            let worst = worst(&Lookup::new(&exact, &choice, 2.0).unwrap(), &segments, &got);
+            let worst = worst(&PreintegratedTable::new(&exact, &choice, 2.0).unwrap(), &segments, &got);
             let bound = if gpu.adapter.is_software() { 1e-4 } else { 5e-3 };
             assert!(worst < bound, "{choice:?}, {emission:?}: {worst}");
             built += 1;
@@ -152,7 +152,7 @@ fn one_plane_is_read_as_on_the_host() {
     if texel_format(&gpu, choice.texels).is_err() {
         return;
     }
-    let table = Lookup::new(&exact(Emission::Chromatic), &choice, 2.0).unwrap();
+    let table = PreintegratedTable::new(&exact(Emission::Chromatic), &choice, 2.0).unwrap();
     let segments = segments(5000);
     let got = looked_up(&gpu, &table, false, &segments);
     let off = segments.iter().zip(&got).filter(|(s, got)| {

@@ -25,8 +25,14 @@ fn tables_are_renewed() {
         for texels in [Texels::Float, Texels::Unorm8] {
             let options = IntegrationOptions { texels, ..options };
             for longest in [2.0, 1.5] {
-                let (old, want) = (Lookup::new(&one, &options, 2.0).unwrap(), Lookup::new(&other, &options, longest));
-                assert!(Lookup::renewed(old, &other, &options, longest).unwrap() == want.unwrap(), "{options:?}");
+                let (old, want) = (
+                    PreintegratedTable::new(&one, &options, 2.0).unwrap(),
+                    PreintegratedTable::new(&other, &options, longest),
+                );
+                assert!(
+                    PreintegratedTable::renewed(old, &other, &options, longest).unwrap() == want.unwrap(),
+                    "{options:?}"
+                );
             }
         }
     }
@@ -68,19 +74,19 @@ pub(crate) fn segments(n: usize) -> Vec<[f32; 3]> {
 }
 
 /// What f64 finds in the same table.
-pub(crate) fn judged(table: &Lookup, [front, back, l]: [f32; 3]) -> [f64; 4] {
+pub(crate) fn judged(table: &PreintegratedTable, [front, back, l]: [f32; 3]) -> [f64; 4] {
     let [front, back, l] = [front, back, l].map(f64::from);
     match table.stored() {
-        Stored::Volume(t) => t.look_up(front, back, l),
-        Stored::Polynomial(t) => t.look_up(front, back, l),
-        Stored::Cylindrical(t) => t.look_up(front, back, l),
-        Stored::SecondOrder(t) => t.look_up([front, (front + back) / 2.0, back]),
-        Stored::SecondOrderPolynomial(t) => t.look_up([front, (front + back) / 2.0, back], l),
+        TableData::Volume(t) => t.look_up(front, back, l),
+        TableData::Polynomial(t) => t.look_up(front, back, l),
+        TableData::Cylindrical(t) => t.look_up(front, back, l),
+        TableData::SecondOrder(t) => t.look_up([front, (front + back) / 2.0, back]),
+        TableData::SecondOrderPolynomial(t) => t.look_up([front, (front + back) / 2.0, back], l),
     }
 }
 
 /// The greatest of the errors of `got` against f64's look-ups, over emission where that is direct and so has no bound.
-pub(crate) fn worst(table: &Lookup, segments: &[[f32; 3]], got: &[[f32; 4]]) -> f64 {
+pub(crate) fn worst(table: &PreintegratedTable, segments: &[[f32; 3]], got: &[[f32; 4]]) -> f64 {
     let errors = segments.iter().zip(got).map(|(s, got)| {
         let want = judged(table, *s);
         (0..4).map(|k| (f64::from(got[k]) - want[k]).abs()).fold(0.0, f64::max)
@@ -96,7 +102,7 @@ fn look_ups_are_those_of_f64() {
             if options.planes == Planes::One {
                 continue;
             }
-            let table = Lookup::new(&exact(emission), &options, 2.0).unwrap();
+            let table = PreintegratedTable::new(&exact(emission), &options, 2.0).unwrap();
             let got: Vec<_> = segments.iter().map(|&[f, b, l]| table.look_up(f, b, l)).collect();
             let worst = worst(&table, &segments, &got);
             assert!(worst < 4e-6, "{options:?}, {emission:?}: {worst}");
@@ -110,7 +116,7 @@ fn one_plane_is_the_nearer_of_two() {
     let of = |planes| {
         let options =
             IntegrationOptions { planes, table: Some([15, 15, 24]), ..IntegrationOptions::of(Form::Cylindrical) };
-        Lookup::new(&exact, &options, 2.0).unwrap()
+        PreintegratedTable::new(&exact, &options, 2.0).unwrap()
     };
     let (one, two) = (of(Planes::One), of(Planes::Two));
     // On a plane both read the same: a = k / 24, at the border of the first part and in it.
@@ -118,7 +124,7 @@ fn one_plane_is_the_nearer_of_two() {
         let [a, b] = [&one, &two].map(|t| t.look_up(front, back, l));
         assert!((0..4).all(|k| (a[k] - b[k]).abs() < 1e-5), "{a:?}, {b:?}");
     }
-    let between = |t: &Lookup| t.look_up(0.5, 0.0, 0.57);
+    let between = |t: &PreintegratedTable| t.look_up(0.5, 0.0, 0.57);
     assert!((between(&one)[3] - between(&two)[3]).abs() > 1e-5);
 }
 
@@ -128,8 +134,8 @@ fn fewer_bits_round_texels() {
     let segments = segments(2000);
     for options in choices() {
         let error = |texels| {
-            let table = Lookup::new(&exact, &IntegrationOptions { texels, ..options }, 2.0).unwrap();
-            let fine = Lookup::new(&exact, &options, 2.0).unwrap();
+            let table = PreintegratedTable::new(&exact, &IntegrationOptions { texels, ..options }, 2.0).unwrap();
+            let fine = PreintegratedTable::new(&exact, &options, 2.0).unwrap();
             let got: Vec<_> = segments.iter().map(|&[f, b, l]| table.look_up(f, b, l)).collect();
             let want: Vec<_> = segments.iter().map(|&[f, b, l]| fine.look_up(f, b, l)).collect();
             let error = |(a, b): (&[f32; 4], &[f32; 4])| (0..4).map(|k| (a[k] - b[k]).abs()).fold(0.0, f32::max);
@@ -151,7 +157,7 @@ fn an_opaque_stretch_leaves_levels_to_the_rest() {
     for form in [Form::Volume, Form::Polynomial, Form::Cylindrical] {
         let options = IntegrationOptions { table: Some([128, 128, 16]), ..IntegrationOptions::of(form) };
         let [float, sixteen, eight] = [Texels::Float, Texels::Unorm16, Texels::Unorm8].map(|texels| {
-            let table = Lookup::new(&exact, &IntegrationOptions { texels, ..options }, 2.0).unwrap();
+            let table = PreintegratedTable::new(&exact, &IntegrationOptions { texels, ..options }, 2.0).unwrap();
             segments.iter().map(|&[f, b, l]| table.look_up(f, b, l)).collect::<Vec<_>>()
         });
         let rmse = |a: &[[f32; 4]]| {
@@ -170,7 +176,7 @@ fn linear_opacity_meets_the_exponential_at_the_ends() {
     let of = |opacity| {
         let options =
             IntegrationOptions { alpha: opacity, table: Some([33, 33, 0]), ..IntegrationOptions::of(Form::Polynomial) };
-        Lookup::new(&exact, &options, 2.0).unwrap()
+        PreintegratedTable::new(&exact, &options, 2.0).unwrap()
     };
     let alpha = |opacity, l| of(opacity).look_up(0.3, 0.1, l)[3];
     for l in [0.0, 2.0] {
@@ -187,7 +193,7 @@ fn limits_are_finite() {
     let exact = Exact::<f64>::new(&transfer, field::Kind::Scalar, &UNIT, 1.0);
     for options in choices() {
         for texels in [Texels::Float, Texels::Unorm8] {
-            let table = Lookup::new(&exact, &IntegrationOptions { texels, ..options }, 2.0).unwrap();
+            let table = PreintegratedTable::new(&exact, &IntegrationOptions { texels, ..options }, 2.0).unwrap();
             for [f, b, l] in segments(500).into_iter().chain([[2.0, -2.0, 5.0], [0.005, 0.005, 1e-30]]) {
                 let c = table.look_up(f, b, l);
                 assert!(
@@ -198,7 +204,8 @@ fn limits_are_finite() {
         }
     }
     let pair = Exact::<f64>::new(&transfer, field::Kind::Pair, &UNIT, 1.0);
-    let refused = Lookup::new(&pair, &IntegrationOptions::of(Form::SecondOrder), 1.0).unwrap_err().to_string();
+    let refused =
+        PreintegratedTable::new(&pair, &IntegrationOptions::of(Form::SecondOrder), 1.0).unwrap_err().to_string();
     assert!(refused.contains("one component"), "{refused}");
 }
 
@@ -208,7 +215,7 @@ fn worst_of_components<const N: usize>(
     narrow: &Exact<f32>,
     options: &IntegrationOptions,
 ) -> [f64; 2] {
-    let table = Lookup::new(exact, options, 2.0).unwrap();
+    let table = PreintegratedTable::new(exact, options, 2.0).unwrap();
     let (mut colours, mut opacities) = (0.0f64, 0.0f64);
     let all = segments(4000);
     for (i, [s, t, l]) in all.iter().copied().enumerate() {
@@ -249,9 +256,9 @@ fn weights_stand_for_colours_of_their_own() {
         ] {
             let errors = [small, large].map(|size| {
                 let options = IntegrationOptions { table: Some(size), degree: 3, ..IntegrationOptions::of(form) };
-                let bound = match Lookup::new(&pair.0, &options, 2.0).unwrap().stored() {
-                    Stored::Volume(t) => t.bound(&weights),
-                    Stored::Polynomial(t) => t.bound(&weights),
+                let bound = match PreintegratedTable::new(&pair.0, &options, 2.0).unwrap().stored() {
+                    TableData::Volume(t) => t.bound(&weights),
+                    TableData::Polynomial(t) => t.bound(&weights),
                     _ => None,
                 };
                 let [pairs, colours] = [
@@ -280,7 +287,7 @@ fn small_cells_beside_huge_ones_keep_their_extinction() {
     let transfer = TransferFunction::new(vec![(0.0, [0.2, 0.5, 1.0])], vec![(-1.0, 500.0), (1.0, 900.0)], 1.0).unwrap();
     let exact = Exact::<f64>::new(&transfer, field::Kind::Scalar, &UNIT, 1.0);
     for form in [Form::Volume, Form::Polynomial] {
-        let table = Lookup::new(&exact, &IntegrationOptions::of(form), 2.0).unwrap();
+        let table = PreintegratedTable::new(&exact, &IntegrationOptions::of(form), 2.0).unwrap();
         for l in [2e-4, 2e-3, 1e-2] {
             let [.., blue, alpha] = table.look_up(0.0, 0.0, l);
             let want = -(-700.0 * f64::from(l)).exp_m1();

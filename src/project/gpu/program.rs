@@ -10,7 +10,7 @@ use crate::gpu::raster::{self, Slot};
 use crate::gpu::rays::FAR;
 use crate::gpu::shader::{self, Array, Variant};
 use crate::gpu::table::{self, TABLE};
-use crate::integral::Lookup;
+use crate::integral::PreintegratedTable;
 use crate::order::depth::HIDDEN;
 use crate::order::{MOST_PARTS, PART};
 use crate::project::{Compositing, Fragments, ProjectionOptions, Thickness};
@@ -139,7 +139,7 @@ pub(super) fn program(
     association: &str,
     Drawn { options, blend }: Drawn,
     layout: &Layout,
-    table: Option<&Lookup>,
+    table: Option<&PreintegratedTable>,
     limits: Limits,
     arrays: &[Array],
 ) -> String {

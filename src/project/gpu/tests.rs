@@ -28,8 +28,9 @@ fn every_program_is_valid() {
     for kind in KINDS {
         for fragments in FORMS {
             for (direct, chunks, association) in [(false, 1, "POINT"), (true, 3, "CORNER"), (false, 2, "CELL")] {
-                let tables =
-                    choices().into_iter().map(|c| Some(Lookup::new(&exact(Emission::Chromatic), &c, 2.0).unwrap()));
+                let tables = choices()
+                    .into_iter()
+                    .map(|c| Some(PreintegratedTable::new(&exact(Emission::Chromatic), &c, 2.0).unwrap()));
                 for (i, table) in std::iter::once(None).chain(tables).enumerate() {
                     let has_line = table.is_none() && kind != Kind::Pair;
                     let options = ProjectionOptions {
