@@ -180,14 +180,14 @@ impl Renderer {
     }
 
     /// Takes `part` for changed, wherever it is kept.
-    fn forget(&mut self, part: Part) {
+    fn invalidate(&mut self, part: Part) {
         (self.exact, self.key) = (None, None);
         match part {
-            Part::Function => self.extra.forget_function(),
-            Part::Mesh | Part::Field | Part::Points => self.extra.forget_field(),
+            Part::Function => self.extra.invalidate_function(),
+            Part::Mesh | Part::Field | Part::Points => self.extra.invalidate_field(),
         }
-        self.backend.forget(part);
-        self.backend.forget(Part::Function);
+        self.backend.invalidate(part);
+        self.backend.invalidate(Part::Function);
     }
 
     /// Draws with other variants of the projection engine from now on; nothing to other engines.
@@ -202,8 +202,8 @@ impl Renderer {
             self.integral = integral;
             // Values may have to be in the range of tables.
             self.exact = None;
-            self.extra.forget_function();
-            self.grid.iter_mut().for_each(LoadedGrid::forget_function);
+            self.extra.invalidate_function();
+            self.grid.iter_mut().for_each(LoadedGrid::invalidate_function);
             (self.key, self.waits, self.host_builds) = (None, integral.form != Form::Auto, false);
         }
     }
@@ -250,7 +250,7 @@ impl Renderer {
         self.stats.tetrahedra = mesh.tetrahedra.corners.len() as u64;
         self.stats.device_bytes = mesh.geometry.bytes();
         self.field = None;
-        self.forget(Part::Mesh);
+        self.invalidate(Part::Mesh);
         self.mesh = Some(mesh);
         self.name_device();
         self.waits = self.integral.form != Form::Auto;
@@ -281,11 +281,11 @@ impl Renderer {
             return self.connect(points);
         }
         self.name_device();
-        self.extra.forget_field();
-        self.backend.forget(Part::Points);
+        self.extra.invalidate_field();
+        self.backend.invalidate(Part::Points);
         // Extinction counts per normalised length.
         if scaled {
-            self.forget(Part::Function);
+            self.invalidate(Part::Function);
         }
         Ok(())
     }
@@ -318,7 +318,7 @@ impl Renderer {
         let prepared = self.pool.install(|| Prepared::new(mesh, field, transfer, tables))?;
         self.stats.device_bytes = mesh.geometry.bytes() + prepared.values.bytes();
         self.field = Some(prepared);
-        self.forget(Part::Field);
+        self.invalidate(Part::Field);
         self.waits = self.integral.form != Form::Auto;
         self.stats.upload_ms = ms(start);
         Ok(())
@@ -328,9 +328,9 @@ impl Renderer {
     pub fn set_transfer(&mut self, transfer: &TransferFunction) {
         self.transfer = Some(transfer.clone());
         if let Some(grid) = &mut self.grid {
-            grid.forget_function();
+            grid.invalidate_function();
         }
-        self.forget(Part::Function);
+        self.invalidate(Part::Function);
         self.name_device();
     }
 
@@ -376,7 +376,7 @@ impl Renderer {
         let changed = self.pool.install(|| field.fit(mesh, transfer, tables))?;
         field.warn(transfer);
         if changed {
-            self.forget(Part::Field);
+            self.invalidate(Part::Field);
         }
         Ok(())
     }
@@ -439,7 +439,7 @@ impl Renderer {
         };
         if let (Some(key), Some(built)) = (key, built.as_ref().filter(|b| b.table.source().is_some())) {
             let asked = Instant::now();
-            match self.backend.hold(exact, &built.table, self.waits) {
+            match self.backend.ensure_resident(exact, &built.table, self.waits) {
                 Err(e @ Error::Lost(_)) => return Err(e),
                 Err(e) => {
                     tracing::warn!("{e}; building the table on the CPU");

@@ -92,12 +92,12 @@ pub(crate) struct OnDevice {
 
 /// The table that a device holds, and its twin on the host.
 #[derive(Debug, Default)]
-pub(crate) struct Held {
+pub(crate) struct TableCache {
     table: Option<(Option<Arc<PreintegratedTable>>, OnDevice)>,
     builder: Option<Builder>,
 }
 
-impl Held {
+impl TableCache {
     /// Hands over `table` unless it is there, or has the device build it of the function that `function` tells; without
     /// one, the smallest that can be bound.
     ///

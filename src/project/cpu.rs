@@ -141,7 +141,7 @@ impl Sweep {
     }
 
     /// Takes the values of cells, or the function, for changed.
-    pub(crate) fn forget_values(&mut self) {
+    pub(crate) fn invalidate_values(&mut self) {
         self.lines.clear();
     }
 

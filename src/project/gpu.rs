@@ -55,7 +55,7 @@ struct Slice {
 }
 
 /// The transfer function on the device.
-struct HeldFunction {
+struct FunctionBuffers {
     buffers: [Buffer; 3],
     lines: Texture,
     bins: Buffer,
@@ -69,7 +69,7 @@ pub(crate) struct Project {
     cells: Option<Chunks>,
     points: Option<Chunks>,
     values: Option<Chunks>,
-    function: Option<HeldFunction>,
+    function: Option<FunctionBuffers>,
     /// What is known of the order of the mesh, and the last one.
     mpvo: Mpvo,
     sequence: Option<Sequenced>,
@@ -77,7 +77,7 @@ pub(crate) struct Project {
     programs: Vec<Program>,
     canvas: Option<Canvas>,
     ordered: Option<Ordered>,
-    table: table::Held,
+    table: table::TableCache,
     sorter: Option<Sorter>,
     /// Whether the device sorts where it can; tests have the host do it.
     sorts: bool,
@@ -133,7 +133,7 @@ impl Project {
             programs: vec![],
             canvas: None,
             ordered: None,
-            table: table::Held::default(),
+            table: table::TableCache::default(),
             sorter: None,
             sorts: true,
             order_chunk: BATCH << 6,
@@ -163,7 +163,7 @@ impl Project {
     }
 
     /// Takes `part` for changed.
-    pub(crate) fn forget(&mut self, part: Part) {
+    pub(crate) fn invalidate(&mut self, part: Part) {
         self.ordered = None;
         if matches!(part, Part::Mesh | Part::Points) {
             (self.mpvo, self.sequence) = (Mpvo::default(), None);
@@ -194,12 +194,12 @@ impl Project {
     /// Has the device hold the function and `table`, or build that, unless it does.
     ///
     /// # Errors
-    /// Those of [`table::Held::prepare`].
+    /// Those of [`table::TableCache::prepare`].
     pub(crate) fn prepare_table(&mut self, exact: &Exact<f32>, table: Option<&Arc<PreintegratedTable>>) -> Result<()> {
         let gpu = &self.gpu;
         let function = match self.function.take() {
             Some(function) => function,
-            None => HeldFunction {
+            None => FunctionBuffers {
                 buffers: function::upload(gpu, exact)?,
                 lines: lines::image(gpu, exact)?,
                 bins: Buffer::holding(gpu, "bins", &lines::bins(exact), Usage::STORAGE)?,
@@ -329,7 +329,7 @@ struct Pass {
 impl Pass {
     fn new(project: &Project, seen: &Seen) -> Result<Self> {
         let gpu = &project.gpu;
-        let (Some(HeldFunction { buffers: function, lines, bins, .. }), Some(program), Some(table)) =
+        let (Some(FunctionBuffers { buffers: function, lines, bins, .. }), Some(program), Some(table)) =
             (&project.function, project.programs.first(), project.table.get())
         else {
             return Err(unprepared());

@@ -156,18 +156,23 @@ impl Backend {
     }
 
     /// Takes `part` for changed.
-    pub(super) fn forget(&mut self, part: Part) {
+    pub(super) fn invalidate(&mut self, part: Part) {
         match self {
             Backend::Walk => {}
-            Backend::Project(sweep) if part != Part::Points => sweep.forget_values(),
+            Backend::Project(sweep) if part != Part::Points => sweep.invalidate_values(),
             Backend::Project(_) => {}
-            Backend::WalkOnDevice(traverse) => traverse.forget(part),
-            Backend::ProjectOnDevice(project) => project.forget(part),
+            Backend::WalkOnDevice(traverse) => traverse.invalidate(part),
+            Backend::ProjectOnDevice(project) => project.invalidate(part),
         }
     }
 
     /// Has the device that draws hold `table`, or build it; `wait`s until that is done.
-    pub(super) fn hold(&mut self, exact: &Exact<f32>, table: &Arc<PreintegratedTable>, wait: bool) -> Result<()> {
+    pub(super) fn ensure_resident(
+        &mut self,
+        exact: &Exact<f32>,
+        table: &Arc<PreintegratedTable>,
+        wait: bool,
+    ) -> Result<()> {
         let gpu = match self {
             Backend::Walk | Backend::Project(_) => {
                 return Err(Error::Device("there is no device to build a table".into()));

@@ -43,10 +43,10 @@ struct OnGrid {
 
 impl LoadedGrid {
     /// Takes the transfer function for changed.
-    pub(super) fn forget_function(&mut self) {
+    pub(super) fn invalidate_function(&mut self) {
         if let Some(field) = &mut self.field {
             field.exact = None;
-            field.extra.forget_function();
+            field.extra.invalidate_function();
         }
     }
 }
@@ -99,7 +99,7 @@ impl Renderer {
         let start = Instant::now();
         let volume = self.pool.install(|| Volume::new(grid))?;
         (self.mesh, self.field) = (None, None);
-        self.forget(Part::Mesh);
+        self.invalidate(Part::Mesh);
         (self.stats.cells, self.stats.tetrahedra) = (volume.cell_count() as u64, 0);
         self.stats.faces_ms = ms(start);
         if let Some(gpu) = self.backend.gpu() {

@@ -66,11 +66,11 @@ impl Renderer {
         let Some(mesh) = &mut self.mesh else { return Ok(()) };
         self.pool.install(|| mesh.geometry.connect());
         mesh.connected = true;
-        self.extra.forget_field();
+        self.extra.invalidate_field();
         if let Some(field) = &mut self.field {
             self.pool.install(|| field.bring_to(mesh))?;
         }
-        self.backend.forget(Part::Mesh);
+        self.backend.invalidate(Part::Mesh);
         Ok(())
     }
 }

@@ -107,12 +107,12 @@ impl TwoOrFive {
 
 impl Extra {
     /// Points have moved, or the field is another.
-    pub(super) fn forget_field(&mut self) {
+    pub(super) fn invalidate_field(&mut self) {
         *self = Self::default();
     }
 
     /// The transfer function is another.
-    pub(super) fn forget_function(&mut self) {
+    pub(super) fn invalidate_function(&mut self) {
         (self.function, self.seen) = (None, None);
     }
 
@@ -168,7 +168,7 @@ impl Extra {
             matches!(ready.values, TwoOrFive::Five(_)) == lit && (0..2).all(|k| close(ready.normal[k], normal[k]))
         };
         if !self.values.as_ref().is_some_and(good) {
-            self.forget_function();
+            self.invalidate_function();
             let values = self.gather(mesh, field, normal, lit);
             self.values = Some(Ready { normal, values });
         }

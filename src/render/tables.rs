@@ -153,7 +153,7 @@ impl Renderer {
         self.tables.start(&key, &self.pool)?;
         if let (true, Some(built), Some(exact)) = (key.on_device, self.tables.ready(&key), &self.exact) {
             // What fails now fails again in the next frame, which says so.
-            let _ = self.backend.hold(exact, &built.table, false);
+            let _ = self.backend.ensure_resident(exact, &built.table, false);
         }
         Ok(())
     }

@@ -133,7 +133,7 @@ pub(crate) struct Traverse {
     program: Option<(String, wgpu::ComputePipeline, wgpu::BindGroupLayout)>,
     /// Tables have a group of their own, in programs that read them.
     tables: wgpu::BindGroupLayout,
-    table: table::Held,
+    table: table::TableCache,
 }
 
 impl Traverse {
@@ -141,7 +141,7 @@ impl Traverse {
         use Slot::{Read, Uniform, Write};
         let own = [Uniform, Read, Read, Uniform, Read, Read, Write, Write];
         let [layout, tables] = [&own[..], &table::SLOTS[..]].map(|slots| raster::layout(&gpu, Stages::COMPUTE, slots));
-        let table = table::Held::default();
+        let table = table::TableCache::default();
         Traverse { gpu, layout, cells: None, points: None, values: None, function: None, program: None, tables, table }
     }
 
@@ -156,7 +156,7 @@ impl Traverse {
     }
 
     /// Takes `part` for changed.
-    pub(crate) fn forget(&mut self, part: Part) {
+    pub(crate) fn invalidate(&mut self, part: Part) {
         match part {
             Part::Mesh => (self.cells, self.points, self.values) = (None, None, None),
             Part::Points => self.points = None,
@@ -200,7 +200,7 @@ impl Traverse {
     /// Has the device hold `table`, or build it, unless it does.
     ///
     /// # Errors
-    /// Those of [`table::Held::prepare`].
+    /// Those of [`table::TableCache::prepare`].
     pub(crate) fn prepare_table(&mut self, exact: &Exact<f32>, table: Option<&Arc<PreintegratedTable>>) -> Result<()> {
         let function = match self.function.take() {
             Some(function) => function,

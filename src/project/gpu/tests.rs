@@ -222,7 +222,7 @@ fn orders_of_several_buffers_are_one() {
         assert!(several.compare(&one).unwrap().max < 2e-6, "{order:?}");
         let project = renderer.backend().project().unwrap();
         project.gpu_mut().binding = 512 << 10;
-        project.forget(Part::Mesh);
+        project.invalidate(Part::Mesh);
         let spread = renderer.render(&view, &|_| ()).unwrap();
         let project = renderer.backend().project().unwrap();
         let arrays = bindings(project.chunks());
@@ -231,7 +231,7 @@ fn orders_of_several_buffers_are_one() {
         assert!(spread == several, "{order:?}: {:e}", spread.compare(&several).unwrap().max);
         project.keep_in_chunks_of(BATCH << 6);
         project.gpu_mut().binding = whole;
-        project.forget(Part::Mesh);
+        project.invalidate(Part::Mesh);
     }
 }
 

@@ -18,7 +18,7 @@ pub(super) struct Extra {
 
 impl Extra {
     /// The transfer function is another.
-    pub(super) fn forget_function(&mut self) {
+    pub(super) fn invalidate_function(&mut self) {
         self.function = None;
     }
 

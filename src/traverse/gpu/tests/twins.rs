@@ -183,11 +183,11 @@ fn arrays_of_several_bindings_are_one() {
             let [one, several] = [u64::MAX, 16 << 10].map(|bytes| {
                 if let Some(traverse) = renderer.backend().traverse() {
                     traverse.gpu_mut().binding = bytes.min(128 << 20);
-                    traverse.forget(Part::Mesh);
+                    traverse.invalidate(Part::Mesh);
                 }
                 if let Some(project) = renderer.backend().project() {
                     project.gpu_mut().binding = bytes.min(128 << 20);
-                    project.forget(Part::Mesh);
+                    project.invalidate(Part::Mesh);
                 }
                 let image = draw(&mut renderer, &view);
                 let mut all = vec![];
