@@ -2,20 +2,20 @@
 
 /// A place or direction as the sum of two vectors: one float tells places to 1e-7 only, and a steep transfer function
 /// shows that.
-struct Twice {
+struct DoubleSingle {
     high: vec3f,
     low: vec3f,
 }
 
-fn single(v: vec3f) -> Twice {
-    return Twice(v, vec3f());
+fn single(v: vec3f) -> DoubleSingle {
+    return DoubleSingle(v, vec3f());
 }
 
 /// A ray's own coordinates: two axes across it, of unit length, and one along it, in lengths of its direction.
 struct Ray {
-    origin: Twice,
+    origin: DoubleSingle,
     /// The high part has 12 digits.
-    direction: Twice,
+    direction: DoubleSingle,
     /// Its length.
     length: f32,
     /// A unit vector.
@@ -42,10 +42,10 @@ struct Step {
 const NOWHERE = 3u;
 
 /// The sum of two vectors, with what its rounding left (Knuth 1969, 4.2.2 B).
-fn sum(a: vec3f, b: vec3f) -> Twice {
+fn sum(a: vec3f, b: vec3f) -> DoubleSingle {
     let s = computed(a + b);
     let v = computed(s - a);
-    return Twice(s, (a - (s - v)) + (b - v));
+    return DoubleSingle(s, (a - (s - v)) + (b - v));
 }
 
 /// `v`. Compilers may take (a + b) - a for b, and Mesa's does, but not across this.
@@ -59,14 +59,14 @@ fn shortened(v: vec3f) -> vec3f {
 }
 
 /// v[0] + x v[1] + y v[2], for whole numbers x and y of 14 digits and high parts of v[1] and v[2] of 10.
-fn affine(v: array<Twice, 3>, x: f32, y: f32) -> Twice {
+fn affine(v: array<DoubleSingle, 3>, x: f32, y: f32) -> DoubleSingle {
     let first = sum(v[0].high, v[1].high * x);
     let second = sum(first.high, v[2].high * y);
     return sum(second.high, (first.low + second.low) + (v[0].low + (v[1].low * x + v[2].low * y)));
 }
 
 /// The frame of the ray from `origin` along `direction` (Duff et al. 2017).
-fn ray_along(origin: Twice, direction: Twice) -> Ray {
+fn ray_along(origin: DoubleSingle, direction: DoubleSingle) -> Ray {
     let high = shortened(direction.high);
     let low = (direction.high - high) + direction.low;
     let size = length(direction.high);
@@ -76,14 +76,14 @@ fn ray_along(origin: Twice, direction: Twice) -> Ray {
     let b = n.x * n.y * a;
     let right = vec3f(1.0 + side * n.x * n.x * a, side * b, -side * n.x);
     let up = vec3f(b, side + n.y * n.y * a, -n.y);
-    return Ray(origin, Twice(high, low), size, n, right, up);
+    return Ray(origin, DoubleSingle(high, low), size, n, right, up);
 }
 
 /// `p` in the coordinates of the ray: two across it, and the two parts of one along it. What lies along the ray is
 /// taken off before the axes across it are asked, so that the places across it are as accurate as they are small. Every
 /// fma is written out, so that a point gets the same bits for each of its cells; tiny coordinates become 0, so that no
 /// product of two underflows.
-fn project(ray: Ray, p: Twice) -> vec4f {
+fn project(ray: Ray, p: DoubleSingle) -> vec4f {
     let q = sum(p.high, -ray.origin.high);
     let t = shortened(vec3f(dot_fma(q.high, ray.along) / ray.length));
     let low = q.low + (p.low - ray.origin.low);

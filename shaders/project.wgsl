@@ -14,8 +14,8 @@ struct Frame {
     origin: array<vec4f, 2>,
     direction: array<vec4f, 3>,
     /// The same by columns and rows, in the mesh's own coordinates: see `affine`.
-    starts: array<Twice, 3>,
-    ways: array<Twice, 3>,
+    starts: array<DoubleSingle, 3>,
+    ways: array<DoubleSingle, 3>,
     /// Width and height of the image, in pixels.
     size: vec2f,
     /// From a pixel's centre to its sample, in units of x and y.
@@ -69,11 +69,11 @@ fn stretch_of(linear: vec3f, square: vec3f, offset: vec2f) -> f32 {
 }
 
 /// How what is by columns and rows differs from one pixel to the next on the right, and below.
-fn by_column(v: array<Twice, 3>) -> vec3f {
+fn by_column(v: array<DoubleSingle, 3>) -> vec3f {
     return v[1].high + v[1].low;
 }
 
-fn by_row(v: array<Twice, 3>) -> vec3f {
+fn by_row(v: array<DoubleSingle, 3>) -> vec3f {
     return v[2].high + v[2].low;
 }
 

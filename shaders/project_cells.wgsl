@@ -23,14 +23,14 @@ fn place(p: Point) -> vec3f {
     return (high_of(p) - frame.base.xyz) + (low_of(p) - frame.base_low.xyz);
 }
 
-fn twice_of(p: Point) -> Twice {
-    return Twice(high_of(p), low_of(p));
+fn double_single_of(p: Point) -> DoubleSingle {
+    return DoubleSingle(high_of(p), low_of(p));
 }
 
 /// A tetrahedron: its corners relative to the frame's base, and in the mesh's own coordinates.
 struct Solid {
     p: array<vec3f, 4>,
-    corners: array<Twice, 4>,
+    corners: array<DoubleSingle, 4>,
 }
 
 fn solid_of(cell: vec4u) -> Solid {
@@ -40,7 +40,7 @@ fn solid_of(cell: vec4u) -> Solid {
     let d = points(cell.w);
     return Solid(
         array<vec3f, 4>(place(a), place(b), place(c), place(d)),
-        array<Twice, 4>(twice_of(a), twice_of(b), twice_of(c), twice_of(d)),
+        array<DoubleSingle, 4>(double_single_of(a), double_single_of(b), double_single_of(c), double_single_of(d)),
     );
 }
 

@@ -1,7 +1,7 @@
 // Drawing by interpolation: the words and values are those of project_interpolated.wgsl.
 
 @fragment
-fn fragment(drawn: Drawn) -> Fragment {
+fn fragment(drawn: VertexOutput) -> Fragment {
     let words = words_of(drawn);
     let values = values_in(words);
     cell_plane = words[3].y;

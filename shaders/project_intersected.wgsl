@@ -136,42 +136,42 @@ const ASIDE = vec2f(4e-4, 1.7e-4);
 
 /// From `p` to the point at `t` of a ray from `start` along `way`: as accurate as it is short, as faces that rays graze
 /// ask for that. `t` has 12 digits.
-fn way_to(start: Twice, way: Twice, t: f32, p: Twice) -> vec3f {
+fn way_to(start: DoubleSingle, way: DoubleSingle, t: f32, p: DoubleSingle) -> vec3f {
     let high = shortened(way.high);
     let low = (way.high - high) + way.low;
     let q = sum(p.high, -start.high);
     return (t * high - q.high) + (t * low - (q.low + (p.low - start.low)));
 }
 
-fn added(a: Twice, b: Twice) -> Twice {
+fn added(a: DoubleSingle, b: DoubleSingle) -> DoubleSingle {
     let s = sum(a.high, b.high);
     return sum(s.high, s.low + (a.low + b.low));
 }
 
-fn negated(a: Twice) -> Twice {
-    return Twice(-a.high, -a.low);
+fn negated(a: DoubleSingle) -> DoubleSingle {
+    return DoubleSingle(-a.high, -a.low);
 }
 
 /// The products of components (Dekker 1971).
-fn multiplied(a: Twice, b: Twice) -> Twice {
+fn multiplied(a: DoubleSingle, b: DoubleSingle) -> DoubleSingle {
     let p = computed(a.high * b.high);
     let a_high = shortened(a.high);
     let b_high = shortened(b.high);
     let a_low = a.high - a_high;
     let b_low = b.high - b_high;
     let rest = (((a_high * b_high - p) + a_high * b_low) + a_low * b_high) + a_low * b_low;
-    return Twice(p, rest + (a.high * b.low + a.low * b.high));
+    return DoubleSingle(p, rest + (a.high * b.low + a.low * b.high));
 }
 
-fn crossed(a: Twice, b: Twice) -> Twice {
-    let p = multiplied(Twice(a.high.yzx, a.low.yzx), Twice(b.high.zxy, b.low.zxy));
-    let q = multiplied(Twice(a.high.zxy, a.low.zxy), Twice(b.high.yzx, b.low.yzx));
+fn crossed(a: DoubleSingle, b: DoubleSingle) -> DoubleSingle {
+    let p = multiplied(DoubleSingle(a.high.yzx, a.low.yzx), DoubleSingle(b.high.zxy, b.low.zxy));
+    let q = multiplied(DoubleSingle(a.high.zxy, a.low.zxy), DoubleSingle(b.high.yzx, b.low.yzx));
     return added(p, negated(q));
 }
 
-fn dotted(a: Twice, b: Twice) -> f32 {
+fn dotted(a: DoubleSingle, b: DoubleSingle) -> f32 {
     let p = multiplied(a, b);
-    let whole = added(added(p, Twice(p.high.yzx, p.low.yzx)), Twice(p.high.zxy, p.low.zxy));
+    let whole = added(added(p, DoubleSingle(p.high.yzx, p.low.yzx)), DoubleSingle(p.high.zxy, p.low.zxy));
     return whole.high.x;
 }
 
@@ -200,7 +200,7 @@ fn write_record(i: u32, solid: Solid, own_values: array<Value, 4>, piece: u32, r
     let last = select(select(select(3u, 2u, shown.z == largest), 1u, shown.y == largest), 0u, shown.x == largest);
     let to = ending_with(last);
     var own = solid.corners;
-    let at = array<Twice, 4>(own[to.x], own[to.y], own[to.z], own[to.w]);
+    let at = array<DoubleSingle, 4>(own[to.x], own[to.y], own[to.z], own[to.w]);
     var given = own_values;
     let v = array<Value, 4>(given[to.x], given[to.y], given[to.z], given[to.w]);
     let ab = added(at[1], negated(at[0]));

@@ -35,7 +35,7 @@ fn nearness_at(t: vec2f, stretch: f32, depth: f32) -> vec2f {
 }
 
 @fragment
-fn fragment(drawn: Drawn) -> Fragment {
+fn fragment(drawn: VertexOutput) -> Fragment {
     let words = words_of(drawn);
     let values = values_in(words);
     let at = drawn.at.xy;

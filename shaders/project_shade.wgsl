@@ -3,7 +3,7 @@
 /// Of each triangle the first vertex's words are taken. Positions have w = 1, so that all that is not flat is
 /// interpolated linearly on the screen.
 @vertex
-fn vertex(stored: Stored) -> Drawn {
+fn vertex(stored: VertexInput) -> VertexOutput {
     let at = stored.corner / frame.size;
     return drawn_at(vec4f(2.0 * at.x - 1.0, 1.0 - 2.0 * at.y, 0.5, 1.0), stored);
 }

@@ -21,8 +21,8 @@ struct Box {
 /// All rays of a frame: that of column x and row y starts at origin · (1, x, y) and runs along direction · (1, x, y);
 /// coordinates are the mesh's normalised ones.
 struct Frame {
-    origin: array<Twice, 3>,
-    direction: array<Twice, 3>,
+    origin: array<DoubleSingle, 3>,
+    direction: array<DoubleSingle, 3>,
     /// Width and height of the image, in pixels.
     size: vec2u,
     /// The rows that this dispatch draws.
@@ -281,9 +281,9 @@ fn face_of(ray: Ray, ids: vec3u) -> Face {
     return Face(a, b, c, areas_of(a, b, c));
 }
 
-fn position(i: u32) -> Twice {
+fn position(i: u32) -> DoubleSingle {
     let p = points(i);
-    return Twice(high_of(p), low_of(p));
+    return DoubleSingle(high_of(p), low_of(p));
 }
 
 /// Walks from an entry until the ray leaves the mesh or ends; false if it got lost.

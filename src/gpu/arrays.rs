@@ -22,7 +22,7 @@ pub(crate) const INVISIBLE: f32 = 3e38;
 /// Those of [`Chunks::new`].
 pub(crate) fn points(gpu: &Gpu, geometry: &TetMesh) -> Result<Chunks> {
     Chunks::new(gpu, "points", &geometry.points, |&p| {
-        let [[x, y, z], [x_low, y_low, z_low]] = rays::twice(p);
+        let [[x, y, z], [x_low, y_low, z_low]] = rays::double_single(p);
         [x, y, z, x_low, y_low, z_low]
     })
 }

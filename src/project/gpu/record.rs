@@ -100,8 +100,8 @@ impl Layout {
         parts
     }
 
-    /// `integrated`, the exact integral of a segment; `Record` and `store`, which fills its words; `Stored`, which is what a vertex
-    /// finds of it, and `Drawn`, which it hands on to fragments; and what fragments take out of that again.
+    /// `integrated`, the exact integral of a segment; `Record` and `store`, which fills its words; `VertexInput`, which is what a vertex
+    /// finds of it, and `VertexOutput`, which it hands on to fragments; and what fragments take out of that again.
     pub(crate) fn wgsl(&self) -> String {
         let Layout { parts, words, share, has_line, line_at, values: (first, count), components, .. } = *self;
         let own = |each: &dyn Fn(usize, &str) -> String, skipped: usize| {
@@ -152,22 +152,22 @@ impl Layout {
                 each(&|w| format!("records[i].vertices[{}].words[{}] = {}; ", w / share, w % share, word(w)))
             ),
             format!(
-                "struct Stored {{ {}{}}}",
+                "struct VertexInput {{ {}{}}}",
                 own(&|i, field| format!("@location({i}) {field}"), 0),
                 each(&|w| format!("@location({}) word_{w}: vec4f, ", at + w))
             ),
             format!(
-                "struct Drawn {{ @builtin(position) at: vec4f, {}{}}}",
+                "struct VertexOutput {{ @builtin(position) at: vec4f, {}{}}}",
                 own(&|i, field| format!("@location({}) {field}", i - 1), 1),
                 each(&|w| format!("@location({}) @interpolate(flat) word_{w}: vec4f, ", at - 1 + w))
             ),
             format!(
-                "fn drawn_at(at: vec4f, stored: Stored) -> Drawn {{ return Drawn(at, {}{}); }}",
+                "fn drawn_at(at: vec4f, stored: VertexInput) -> VertexOutput {{ return VertexOutput(at, {}{}); }}",
                 self.own.iter().skip(1).map(|(name, ..)| format!("stored.{name}, ")).collect::<String>(),
                 each(&|w| format!("stored.word_{w}, "))
             ),
             format!(
-                "fn words_of(drawn: Drawn) -> Words {{ return Words({}); }}",
+                "fn words_of(drawn: VertexOutput) -> Words {{ return Words({}); }}",
                 each(&|w| format!("drawn.word_{w}, "))
             ),
             format!(

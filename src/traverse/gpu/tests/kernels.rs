@@ -4,7 +4,7 @@ use super::random::{Random, random_transfer};
 use crate::cell::{Face, Projected};
 use crate::field::{Kind, Normalization};
 use crate::gpu::function::{Function, Knot};
-use crate::gpu::rays::twice;
+use crate::gpu::rays::double_single;
 use crate::gpu::testing::{gpu, validated};
 use crate::integral::Light;
 use crate::traverse::gpu::*;
@@ -190,8 +190,8 @@ fn areas_are_as_accurate_as_they_are_small() {
 }
 
 const PLACE_TEST: &str = "
-struct Case { origin: Twice, direction: Twice, point: Twice }
-struct Outcome { place: vec4f, right: vec4f, up: vec4f, sum: Twice }
+struct Case { origin: DoubleSingle, direction: DoubleSingle, point: DoubleSingle }
+struct Outcome { place: vec4f, right: vec4f, up: vec4f, sum: DoubleSingle }
 @group(1) @binding(0) var<storage, read> cases: array<Case>;
 @group(1) @binding(1) var<storage, read_write> outcomes: array<Outcome>;
 @compute @workgroup_size(64)
@@ -222,7 +222,7 @@ fn places_beside_a_ray_are_as_accurate_as_they_are_near() {
             let direction = random.direction() * random.within(0.5, 2.0);
             let aside = random.direction() * 10f64.powf(random.within(-7.0, 0.0));
             [origin, direction, origin + direction * random.within(-2.0, 4.0) + aside]
-                .map(|v| twice(v).map(|[x, y, z]| [x, y, z, 0.0]))
+                .map(|v| double_single(v).map(|[x, y, z]| [x, y, z, 0.0]))
         })
         .collect();
     let variant = Variant { kind: Kind::Scalar, direct: false };
