@@ -100,7 +100,7 @@ fn dot_fma(a: vec3f, b: vec3f) -> f32 {
 
 /// Twice the area of the triangle (origin, a, b): positive if it turns counter-clockwise. Products are taken with what
 /// their rounding leaves (Dekker 1971), as faces seen edge-on are nothing but that.
-fn area(a: vec4f, b: vec4f) -> f32 {
+fn orient2d(a: vec4f, b: vec4f) -> f32 {
     let c = b.yx;
     let p = rounded(a.xy * c);
     let a_high = shortened_pair(a.xy);
@@ -120,7 +120,7 @@ fn shortened_pair(v: vec2f) -> vec2f {
     return bitcast<vec2f>(bitcast<vec2u>(v) & vec2u(0xfffff000u));
 }
 
-/// Whether the origin lies to the left of the line from `a` to `b`, whose area is `twice`. Exact, and never the same
+/// Whether the origin lies to the left of the line from `a` to `b`, whose `orient2d` is `twice`. Exact, and never the same
 /// for (b, a) unless the two coincide.
 fn is_left(a: vec4f, b: vec4f, twice: f32) -> bool {
     if abs(twice) > DOUBT * (abs(a.x * b.y) + abs(a.y * b.x)) {
@@ -168,7 +168,7 @@ fn product(a: f32, b: f32) -> vec4i {
 
 /// The areas of the triangle (a, b, c).
 fn areas_of(a: vec4f, b: vec4f, c: vec4f) -> vec3f {
-    return vec3f(area(b, c), area(c, a), area(a, b));
+    return vec3f(orient2d(b, c), orient2d(c, a), orient2d(a, b));
 }
 
 /// Whether the triangle (a, b, c) with these areas turns counter-clockwise around the origin.
@@ -184,7 +184,7 @@ fn holds(a: vec4f, b: vec4f, c: vec4f, areas: vec3f) -> bool {
 
 /// Walks through the cell that has this face and the further corner `apex`, to the other face that holds the origin.
 fn step(face: Face, apex: vec4f) -> Step {
-    let to = vec3f(area(apex, face.a), area(apex, face.b), area(apex, face.c));
+    let to = vec3f(orient2d(apex, face.a), orient2d(apex, face.b), orient2d(apex, face.c));
     let a = is_left(apex, face.a, to.x);
     let b = is_left(apex, face.b, to.y);
     let c = is_left(apex, face.c, to.z);
