@@ -130,9 +130,9 @@ const THIN = 0.25;
 /// Faces that are inclined less than this to the rays are taken for seen edge-on: where rays cross them f32 can't tell.
 const EDGE_ON = 1e-5;
 
-/// By how much rays are aside of pixels' centres when such faces are asked on which side they are, in pixels: of two
+/// How far rays are moved from pixels' centres when such faces are asked on which side they are, in pixels: of two
 /// cells that share one, a ray that lies in it meets exactly one. Less than outlines are grown by.
-const ASIDE = vec2f(4e-4, 1.7e-4);
+const PERTURBATION = vec2f(4e-4, 1.7e-4);
 
 /// From `p` to the point at `t` of a ray from `start` along `way`: as accurate as it is short, as faces that rays graze
 /// ask for that. `t` has 12 digits.
@@ -303,7 +303,7 @@ fn write_record(i: u32, solid: Solid, own_values: array<Value, 4>, piece: u32, r
         towards_eye = -(share[0] * dot(out, n[1]) + share[1] * dot(out, n[2]) + share[2] * dot(out, n[3]));
         facets = array<vec4f, 3>(heights / slopes, across / slopes, along_rows / slopes);
     }
-    heights += ASIDE.x * across + ASIDE.y * along_rows;
+    heights += PERTURBATION.x * across + PERTURBATION.y * along_rows;
     var words: array<vec4f, 6>;
     words[0] = select(facets[0], heights / FLAT, edge_on);
     words[1] = select(facets[1], across / FLAT, edge_on);

@@ -77,7 +77,7 @@ var<private> steps: u32;
 /// that rays which take much work are given up before, and the CPU draws them.
 var<private> finished: bool;
 /// Whether the ray may pass edges of the boundary as closely as it does.
-var<private> anyhow: bool;
+var<private> accept_grazing: bool;
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -137,13 +137,13 @@ fn trace(straight: Ray, limits: vec2f) {
         light = vec4f(0.0, 0.0, 0.0, 1.0);
         largest = Value(-FAR);
         finished = false;
-        anyhow = attempt == 3u;
+        accept_grazing = attempt == 3u;
         follow(ray, limits);
         if finished || work > frame.most_work {
             return;
         }
-        let aside = ASIDE * f32(attempt);
-        ray.origin.low = straight.origin.low + (straight.right + straight.up * 0.618) * aside;
+        let perturbation = PERTURBATION * f32(attempt);
+        ray.origin.low = straight.origin.low + (straight.right + straight.up * 0.618) * perturbation;
         atomicAdd(&counts.repaired, select(0u, 1u, attempt == 1u));
     }
 }
@@ -242,7 +242,7 @@ fn find_entries(ray: Ray, inverse: vec3f, last: Entry, limit: f32) -> bool {
 
 /// Whether a ray passes a face of the boundary beside its edges, as far as places across it can tell.
 fn is_clear(face: Face) -> bool {
-    if anyhow {
+    if accept_grazing {
         return true;
     }
     let across = max(max(abs(face.a.xy), abs(face.b.xy)), abs(face.c.xy));

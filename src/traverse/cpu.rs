@@ -33,8 +33,8 @@ pub const fn least_light(direct: bool) -> f32 {
 /// boundary faces only meet without sharing their corners, rounding could let it slip through.
 const TOO_CLOSE: f64 = 1e-12;
 
-/// How far aside, in normalised units.
-const ASIDE: f64 = 1e-9;
+/// How far rays that are traced again are moved, in normalised units.
+const PERTURBATION: f64 = 1e-9;
 
 /// What a frame took.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -287,24 +287,24 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
                 return gathered;
             }
             self.counts.repaired += u64::from(attempt == 1);
-            frame = straight.shifted(ASIDE * f64::from(attempt), ASIDE * 0.618 * f64::from(attempt));
+            frame = straight.shifted(PERTURBATION * f64::from(attempt), PERTURBATION * 0.618 * f64::from(attempt));
         }
         none()
     }
 
-    /// Follows one ray; false if it passed too close to an edge of the boundary, unless `anyhow`.
+    /// Follows one ray; false if it passed too close to an edge of the boundary, unless `accept_grazing`.
     #[inline(always)]
     fn walk(
         &mut self,
         frame: &Frame,
         pixel: DVec2,
         [t_min, t_max]: [f64; 2],
-        anyhow: bool,
+        accept_grazing: bool,
         gathered: &mut Gathered<S::Value, N>,
     ) -> bool {
         let (origin, along) = frame.ray();
         self.segments.begin(origin, along);
-        if !self.find_entries(frame, pixel) && !anyhow {
+        if !self.find_entries(frame, pixel) && !accept_grazing {
             return false;
         }
         for e in 0..self.entries.len() {
@@ -312,7 +312,7 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
                 break;
             }
             let exit = self.follow(frame, e, [t_min, t_max], gathered);
-            if exit.is_some_and(is_close) && !anyhow {
+            if exit.is_some_and(is_close) && !accept_grazing {
                 return false;
             }
         }

@@ -64,8 +64,8 @@ const AHEAD: usize = 8;
 /// place: above most rounding of places across a ray.
 const CLOSE: f32 = 2e-7;
 
-/// How far aside, in normalised units.
-const ASIDE: f32 = 2e-7;
+/// How far rays that are traced again are moved, in normalised units.
+const PERTURBATION: f32 = 2e-7;
 
 /// `Frame` in the shader.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
@@ -406,7 +406,7 @@ fn program(
         ("BLUR", f64::from(BLUR)),
         ("SLACK", f64::from(MARGIN)),
         ("CLOSE", f64::from(CLOSE)),
-        ("ASIDE", f64::from(ASIDE)),
+        ("PERTURBATION", f64::from(PERTURBATION)),
         ("LEAST_LIGHT", f64::from(least_light(variant.direct))),
     ] {
         text += &format!("const {name} = {value:?}f;\n");
