@@ -48,7 +48,7 @@ struct Counts {
     steps: atomic<u32>,
     carry: atomic<u32>,
     /// Rays that were traced again beside their place.
-    repaired: atomic<u32>,
+    retraced: atomic<u32>,
     unused: u32,
 }
 
@@ -144,7 +144,7 @@ fn trace(straight: Ray, limits: vec2f) {
         }
         let perturbation = PERTURBATION * f32(attempt);
         ray.origin.low = straight.origin.low + (straight.right + straight.up * 0.618) * perturbation;
-        atomicAdd(&counts.repaired, select(0u, 1u, attempt == 1u));
+        atomicAdd(&counts.retraced, select(0u, 1u, attempt == 1u));
     }
 }
 

@@ -189,7 +189,7 @@ mod bridge {
         upload_ms: f64,
         frame_ms: f64,
         steps: u64,
-        repaired_rays: u64,
+        retraced_rays: u64,
         device_bytes: u64,
         uploaded_bytes: u64,
     }
@@ -446,7 +446,7 @@ fn stats(session: &Session) -> Result<Stats> {
             upload_ms: s.upload_ms,
             frame_ms: s.frame_ms,
             steps: s.steps,
-            repaired_rays: s.repaired_rays,
+            retraced_rays: s.retraced_rays,
             device_bytes: s.device_bytes,
             uploaded_bytes: s.uploaded_bytes,
         })

@@ -476,7 +476,7 @@ impl Renderer {
         let Drawn { pixels, counts, device_ms, projection, sweep } = drawn;
         self.stats.device_ms = device_ms;
         self.stats.steps = counts.steps;
-        self.stats.repaired_rays = counts.repaired;
+        self.stats.retraced_rays = counts.retraced;
         (self.stats.cpu_rays, self.stats.panels, self.stats.culled_cells) = (counts.unfinished, 0, 0);
         (self.stats.projection, self.stats.sweep) = (projection, sweep);
         self.stats.frame_ms = ms(start);

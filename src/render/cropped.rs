@@ -32,11 +32,11 @@ impl Renderer {
 
     fn draw_parts(&mut self, parts: &[View], whole: &View, progress: &Progress) -> Result<Image> {
         let mut image = Image::new(whole.size());
-        let (mut steps, mut repaired, mut panels, count) = (0, 0, 0, parts.len() as f64);
+        let (mut steps, mut retraced, mut panels, count) = (0, 0, 0, parts.len() as f64);
         for (i, part) in parts.iter().enumerate() {
             let behind = self.render_or_recover(part, &|share| progress((i as f64 + share) / count))?;
             steps += self.stats.steps;
-            repaired += self.stats.repaired_rays;
+            retraced += self.stats.retraced_rays;
             panels += self.stats.panels;
             let maximum = self.as_values;
             image.pixels.par_iter_mut().zip(&behind.pixels).for_each(|(front, behind)| {
@@ -53,7 +53,7 @@ impl Renderer {
                 break;
             }
         }
-        (self.stats.steps, self.stats.repaired_rays, self.stats.panels) = (steps, repaired, panels);
+        (self.stats.steps, self.stats.retraced_rays, self.stats.panels) = (steps, retraced, panels);
         Ok(image)
     }
 }

@@ -220,7 +220,7 @@ impl Renderer {
         let stats = &mut self.stats;
         stats.panels = panels;
         stats.device_bytes = grid.volume.bytes() + field.samples.bytes() + field.extra.bytes();
-        (stats.steps, stats.repaired_rays, stats.cpu_rays) = (steps, 0, 0);
+        (stats.steps, stats.retraced_rays, stats.cpu_rays) = (steps, 0, 0);
         let own = if of_two { self.integral.two.method.name() } else { Form::Exact.name() };
         stats.integral = built.as_ref().map_or(own, |b| b.table.options().form.name()).into();
         stats.table_ms = built.as_ref().map_or(0.0, |b| b.ms);

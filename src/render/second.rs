@@ -79,7 +79,7 @@ impl Renderer {
             table_bytes: 0,
             knots_per_cell: 0.0,
             steps: counts.steps,
-            repaired_rays: counts.repaired,
+            retraced_rays: counts.retraced,
             cpu_rays: 0,
             panels: counts.panels,
             culled_cells,

@@ -42,7 +42,7 @@ pub struct Counts {
     /// Tetrahedra visited, over all rays.
     pub steps: u64,
     /// Rays that were traced again beside an edge.
-    pub repaired: u64,
+    pub retraced: u64,
     /// Rays that a device left to the CPU.
     pub unfinished: u64,
     /// Panels that segments of two variables, or with light, were summed up in.
@@ -107,7 +107,7 @@ fn render_with<const N: usize, S: Segments<N>>(
         })
         .reduce(Counts::default, |a, b| Counts {
             steps: a.steps + b.steps,
-            repaired: a.repaired + b.repaired,
+            retraced: a.retraced + b.retraced,
             unfinished: 0,
             panels: a.panels + b.panels,
         });
@@ -286,7 +286,7 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
             if self.walk(&frame, pixel, [t_min, t_max], attempt == 3, &mut gathered) {
                 return gathered;
             }
-            self.counts.repaired += u64::from(attempt == 1);
+            self.counts.retraced += u64::from(attempt == 1);
             frame = straight.shifted(PERTURBATION * f64::from(attempt), PERTURBATION * 0.618 * f64::from(attempt));
         }
         none()

@@ -108,7 +108,7 @@ struct Bounds {
 struct RawCounts {
     steps: u32,
     carry: u32,
-    repaired: u32,
+    retraced: u32,
     unused: u32,
 }
 
@@ -347,7 +347,7 @@ impl Traverse {
                 drawn.pixels.extend_from_slice(&bytemuck::cast_slice(image)[..w as usize * rows as usize]);
                 let c: RawCounts = bytemuck::pod_read_unaligned(&rest[..16]);
                 drawn.counts.steps += u64::from(c.carry) << 32 | u64::from(c.steps);
-                drawn.counts.repaired += u64::from(c.repaired);
+                drawn.counts.retraced += u64::from(c.retraced);
                 if clock.is_some() {
                     let [start, end]: [u64; 2] = bytemuck::pod_read_unaligned(&rest[16..32]);
                     let ms = end.saturating_sub(start) as f64 * f64::from(gpu.queue.get_timestamp_period()) / 1e6;

@@ -263,7 +263,7 @@ fn a_mesh_alone() {
     let stats: serde_json::Value = serde_json::from_slice(&std::fs::read(place.path("x.json")).unwrap()).unwrap();
     assert_eq!((&stats["cells"], &stats["tetrahedra"]), (&9.into(), &48.into()), "{stats}");
     for key in
-        ["load_ms", "faces_ms", "upload_ms", "first_frame_ms", "frame_ms", "steps", "device_bytes", "repaired_rays"]
+        ["load_ms", "faces_ms", "upload_ms", "first_frame_ms", "frame_ms", "steps", "device_bytes", "retraced_rays"]
     {
         assert!(stats[key].is_number(), "{key}: {stats}");
     }
