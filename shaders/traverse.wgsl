@@ -149,8 +149,8 @@ fn trace(straight: Ray, limits: vec2f) {
 }
 
 /// Whether nothing behind can be seen.
-fn is_over() -> bool {
-    return light.w < LEAST_LIGHT;
+fn is_terminated() -> bool {
+    return light.w < LEAST_TRANSMITTANCE;
 }
 
 /// Walks from each entry to the next.
@@ -173,7 +173,7 @@ fn follow(ray: Ray, limits: vec2f) {
             if !walk(ray, entry, limits) {
                 return;
             }
-            if is_over() {
+            if is_terminated() {
                 known = 0u;
             }
         }
@@ -357,7 +357,7 @@ fn walk(ray: Ray, entry: Entry, limits: vec2f) -> bool {
                 gather(front, back, vec2f(behind, end) / length, end - behind);
             }
             behind = 0.0;
-            if end < length || is_over() {
+            if end < length || is_terminated() {
                 return true;
             }
         }

@@ -55,7 +55,7 @@ impl Frame {
 
 /// Twice the area of the triangle (origin, a, b): positive if it turns counter-clockwise.
 #[inline(always)]
-pub fn cross(a: Projected, b: Projected) -> f64 {
+pub fn orient2d(a: Projected, b: Projected) -> f64 {
     a.x * b.y - a.y * b.x
 }
 
@@ -95,7 +95,7 @@ impl Face {
     #[inline(always)]
     pub fn enter(corners: [Projected; 3]) -> Option<Self> {
         let [a, b, c] = corners;
-        let areas = [cross(b, c), cross(c, a), cross(a, b)];
+        let areas = [orient2d(b, c), orient2d(c, a), orient2d(a, b)];
         (is_left(b, c, areas[0]) && is_left(c, a, areas[1]) && is_left(a, b, areas[2]))
             .then_some(Face { corners, areas })
     }
@@ -105,7 +105,7 @@ impl Face {
     #[inline(always)]
     pub fn step(&mut self, apex: Projected) -> usize {
         let [a, b, c] = self.corners;
-        let to = [cross(apex, a), cross(apex, b), cross(apex, c)];
+        let to = [orient2d(apex, a), orient2d(apex, b), orient2d(apex, c)];
         let left = [is_left(apex, a, to[0]), is_left(apex, b, to[1]), is_left(apex, c, to[2])];
         // Of three signs around a triangle that holds the origin exactly one falls from left to right.
         let dropped = if left[0] && !left[1] {

@@ -25,7 +25,7 @@ const TILE: u32 = 8;
 
 /// Transmittance below which a ray ends: what lies behind adds less than this times its colour to any channel. Direct
 /// emission has no such bound, and goes on as long as f32 can tell.
-pub const fn least_light(direct: bool) -> f32 {
+pub const fn least_transmittance(direct: bool) -> f32 {
     if direct { f32::MIN_POSITIVE } else { 1e-6 }
 }
 
@@ -308,7 +308,7 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
             return false;
         }
         for e in 0..self.entries.len() {
-            if self.entries[e].t >= t_max || self.is_over(gathered) {
+            if self.entries[e].t >= t_max || self.is_terminated(gathered) {
                 break;
             }
             let exit = self.follow(frame, e, [t_min, t_max], gathered);
@@ -388,7 +388,7 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
                     self.gather(at(from), at(to), [from, to], gathered);
                 }
                 reached = left;
-                if reached >= t_max || self.is_over(gathered) {
+                if reached >= t_max || self.is_terminated(gathered) {
                     return None;
                 }
             }
@@ -403,8 +403,8 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
 
     /// Whether nothing behind can be seen.
     #[inline(always)]
-    fn is_over(&self, gathered: &Gathered<S::Value, N>) -> bool {
-        gathered.light.through < self.segments.least_light()
+    fn is_terminated(&self, gathered: &Gathered<S::Value, N>) -> bool {
+        gathered.light.through < self.segments.least_transmittance()
     }
 
     #[inline(always)]

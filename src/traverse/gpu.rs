@@ -1,6 +1,6 @@
 //! The walk on a GPU: what `shaders/traverse.wgsl` needs, handed over once and kept until it changes.
 
-use super::cpu::{Counts, least_light};
+use super::cpu::{Counts, least_transmittance};
 use crate::error::{Error, Result};
 use crate::geometry::boundary::{BoundaryFace, LEAF};
 use crate::geometry::{Cell, TetMesh, Values};
@@ -407,7 +407,7 @@ fn program(
         ("SLACK", f64::from(MARGIN)),
         ("CLOSE", f64::from(CLOSE)),
         ("PERTURBATION", f64::from(PERTURBATION)),
-        ("LEAST_LIGHT", f64::from(least_light(variant.direct))),
+        ("LEAST_TRANSMITTANCE", f64::from(least_transmittance(variant.direct))),
     ] {
         text += &format!("const {name} = {value:?}f;\n");
     }

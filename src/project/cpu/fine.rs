@@ -12,7 +12,7 @@ use super::setup::{Look, Record, Records, Scene};
 use crate::integral::{Batch, Integral, Light};
 use crate::order::crossings::{Crossings, pixel_at, place};
 use crate::order::screen::{ASIDE, NEAREST, TILE};
-use crate::traverse::cpu::least_light;
+use crate::traverse::cpu::least_transmittance;
 use crate::view::{Blend, View};
 use fearless_simd::Simd;
 
@@ -184,7 +184,7 @@ impl<const N: usize> Canvas<N> {
         );
         self.found.clear();
         if self.fragments >= self.glance {
-            self.rest(least_light(integral.exact.direct), scene.blend);
+            self.rest(least_transmittance(integral.exact.direct), scene.blend);
         }
     }
 
@@ -301,7 +301,7 @@ impl<const N: usize> Canvas<N> {
             }
         }
         if self.fragments >= self.glance {
-            self.rest(least_light(integral.exact.direct), scene.blend);
+            self.rest(least_transmittance(integral.exact.direct), scene.blend);
         }
     }
 
@@ -358,7 +358,7 @@ impl<const N: usize> Canvas<N> {
         mut flawed: impl FnMut(u32, u32, Flaw),
     ) -> u64 {
         let least = match scene.blend {
-            Blend::Composite => least_light(integral.exact.direct),
+            Blend::Composite => least_transmittance(integral.exact.direct),
             Blend::Maximum => f32::NEG_INFINITY,
         };
         let mut covered = 0;
