@@ -94,14 +94,14 @@ fn piece(first_depth: f32, last_depth: f32) -> vec3f {
     let steps = f32(u32(min(max(x, x + (y - x) * end) * end * (1.0 / MILD), 64.0))) + 1.0;
     let width = end / steps;
     var start = 0.0;
-    var through = 1.0;
+    var transmittance = 1.0;
     var sum = vec3f();
     loop {
         let first = (x + (y - x) * start) * width;
         let rise = (y - x) * width * width;
         let p = mild(first + 0.5 * rise, rise);
-        sum += through * vec3f(p.x, select(1.0, width, DIRECT) * vec2f(p.y, start * p.y + width * p.z));
-        through *= p.w;
+        sum += transmittance * vec3f(p.x, select(1.0, width, DIRECT) * vec2f(p.y, start * p.y + width * p.z));
+        transmittance *= p.w;
         start += width;
         work++;
         if start > end - 0.5 * width {

@@ -54,8 +54,8 @@ fn by_lookups(front: Value, back: Value, length: f32, first: u32) -> vec4f {
         let l = part * length;
         let p = piece(f.x * l, r.x * l);
         let color = (f.yzw * p.y + r.yzw * p.z) * select(1.0, l, DIRECT);
-        let through = 1.0 - p.x;
-        sum = vec4f(fma(color, vec3f(select(1.0, sum.w, rises)), sum.xyz * select(through, 1.0, rises)), sum.w * through);
+        let transmittance = 1.0 - p.x;
+        sum = vec4f(fma(color, vec3f(select(1.0, sum.w, rises)), sum.xyz * select(transmittance, 1.0, rises)), sum.w * transmittance);
         work++;
         if is_last || work > most_work() {
             break;

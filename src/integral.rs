@@ -176,22 +176,22 @@ pub struct Light<R> {
     /// Premultiplied colour.
     pub color: [R; 3],
     /// Transmittance, in [0, 1].
-    pub through: R,
+    pub transmittance: R,
 }
 
 impl<R: Real> Light<R> {
     /// Nothing gathered yet.
     pub fn none() -> Self {
-        Light { color: [R::of(0.0); 3], through: R::of(1.0) }
+        Light { color: [R::of(0.0); 3], transmittance: R::of(1.0) }
     }
 
     /// Adds something behind: the light that it emits, and its opacity.
     #[inline(always)]
     pub fn add(&mut self, emitted: [R; 3], alpha: R) {
         for (color, emitted) in self.color.iter_mut().zip(emitted) {
-            *color = *color + self.through * emitted;
+            *color = *color + self.transmittance * emitted;
         }
-        self.through = self.through * (R::of(1.0) - alpha);
+        self.transmittance = self.transmittance * (R::of(1.0) - alpha);
     }
 }
 

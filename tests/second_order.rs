@@ -33,7 +33,7 @@ fn marched(exact: &Exact<f64>, [f, m, b]: [f64; 3], l: f64) -> [f64; 4] {
     let mut light = Light::none();
     (0..n).for_each(|i| exact.add(&[at(i)], &[at(i + 1)], l / f64::from(n), &mut light));
     let [r, g, b] = light.color;
-    [r, g, b, 1.0 - light.through]
+    [r, g, b, 1.0 - light.transmittance]
 }
 
 fn triples(count: u32) -> impl Iterator<Item = [f64; 3]> {

@@ -279,7 +279,7 @@ impl Second {
         } else {
             self.gather(segment, scratch, &mut own);
         }
-        light.add(own.color.map(|c| c as f32), (1.0 - own.through) as f32);
+        light.add(own.color.map(|c| c as f32), (1.0 - own.transmittance) as f32);
     }
 
     #[inline(always)]

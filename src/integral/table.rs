@@ -102,8 +102,8 @@ fn light(exact: &Exact<f64>, front: f64, back: f64, l: f64) -> Light<f64> {
 
 /// Premultiplied colour and opacity.
 fn published(exact: &Exact<f64>, front: f64, back: f64, l: f64) -> [f64; 4] {
-    let Light { color: [r, g, b], through } = light(exact, front, back, l);
-    [r, g, b, 1.0 - through]
+    let Light { color: [r, g, b], transmittance } = light(exact, front, back, l);
+    [r, g, b, 1.0 - transmittance]
 }
 
 #[cfg(test)]

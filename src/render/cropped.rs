@@ -45,8 +45,8 @@ impl Renderer {
                         *front = *behind;
                     }
                 } else {
-                    let through = 1.0 - front[3];
-                    (0..4).for_each(|k| front[k] += through * behind[k]);
+                    let transmittance = 1.0 - front[3];
+                    (0..4).for_each(|k| front[k] += transmittance * behind[k]);
                 }
             });
             if progress((i + 1) as f64 / count).is_break() {

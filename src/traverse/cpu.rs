@@ -233,8 +233,8 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
         let gathered = self.trace(i, j);
         match (self.view.blend(), gathered.largest) {
             (Blend::Composite, _) => {
-                let Light { color: [r, g, b], through } = gathered.light;
-                [r, g, b, 1.0 - through]
+                let Light { color: [r, g, b], transmittance } = gathered.light;
+                [r, g, b, 1.0 - transmittance]
             }
             (Blend::Maximum, Some(values)) => pixel(&values),
             (Blend::Maximum, None) => [0.0; 4],
@@ -404,7 +404,7 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
     /// Whether nothing behind can be seen.
     #[inline(always)]
     fn is_terminated(&self, gathered: &Gathered<S::Value, N>) -> bool {
-        gathered.light.through < self.segments.least_transmittance()
+        gathered.light.transmittance < self.segments.least_transmittance()
     }
 
     #[inline(always)]

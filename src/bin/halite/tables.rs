@@ -312,7 +312,7 @@ fn truth(exact: &Exact<f64>, front: f64, back: f64, l: f64) -> [f64; 4] {
     let mut light = Light::none();
     exact.add(&[front], &[back], l, &mut light);
     let [r, g, b] = light.color;
-    [r, g, b, 1.0 - light.through]
+    [r, g, b, 1.0 - light.transmittance]
 }
 
 /// Values in front and behind and lengths of segments along three additive sequences (Roberts 2018).

@@ -232,7 +232,7 @@ fn worst_of_components<const N: usize>(
         for k in 0..3 {
             colours = colours.max((f64::from(got.color[k]) - want.color[k]).abs());
         }
-        opacities = opacities.max((f64::from(got.through) - want.through).abs());
+        opacities = opacities.max((f64::from(got.transmittance) - want.transmittance).abs());
     }
     [colours, opacities]
 }

@@ -27,9 +27,9 @@ impl<const L: usize> Lanes<L> {
     fn over(&self, behind: &Self) -> Self {
         let mut sum = *self;
         for (sum, behind) in sum.0.iter_mut().zip(&behind.0) {
-            let through = 1.0 - sum[3];
+            let transmittance = 1.0 - sum[3];
             for k in 0..4 {
-                sum[k] += through * behind[k];
+                sum[k] += transmittance * behind[k];
             }
         }
         sum

@@ -234,7 +234,7 @@ impl<const N: usize> Canvas<N> {
             return;
         }
         let [r, g, b, t] = self.light_at(at);
-        let mut light = Light { color: [r, g, b], through: t };
+        let mut light = Light { color: [r, g, b], transmittance: t };
         match integral.table {
             None => {
                 self.batch.add(integral.exact, front, back, length, &mut light);
@@ -243,7 +243,7 @@ impl<const N: usize> Canvas<N> {
             Some(table) => table.add_components(integral.exact, front, back, length, &mut light),
         }
         let [r, g, b] = light.color;
-        let all = [r, g, b, light.through];
+        let all = [r, g, b, light.transmittance];
         self.light.iter_mut().zip(all).for_each(|(channel, v)| channel[at] = v);
     }
 

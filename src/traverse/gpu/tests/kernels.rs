@@ -332,7 +332,7 @@ fn add(exact: &Exact<f64>, kind: Kind, front: &[f32; 4], back: &[f32; 4], length
         Kind::Pair => exact.add(&[f[0], f[1]], &[b[0], b[1]], l, &mut light),
         Kind::Rgba => exact.add(&f, &b, l, &mut light),
     }
-    [light.color[0], light.color[1], light.color[2], light.through]
+    [light.color[0], light.color[1], light.color[2], light.transmittance]
 }
 
 fn add_fast(exact: &Exact<f32>, kind: Kind, f: &[f32; 4], b: &[f32; 4], length: f32) -> [f32; 4] {
@@ -342,5 +342,5 @@ fn add_fast(exact: &Exact<f32>, kind: Kind, f: &[f32; 4], b: &[f32; 4], length: 
         Kind::Pair => exact.add(&[f[0], f[1]], &[b[0], b[1]], length, &mut light),
         Kind::Rgba => exact.add(f, b, length, &mut light),
     }
-    [light.color[0], light.color[1], light.color[2], light.through]
+    [light.color[0], light.color[1], light.color[2], light.transmittance]
 }
