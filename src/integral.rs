@@ -40,7 +40,7 @@ use knots::{BRIGHTEST, Side, Track, compile, extinction, sample};
 pub(crate) const OPAQUE_EXTINCTION: f64 = 1e15;
 
 /// Optical depth beyond which e^{−T} is nothing in f32.
-pub(crate) const DEEP: f64 = 18.0;
+pub(crate) const OPAQUE_DEPTH: f64 = 18.0;
 
 /// Nodes in [0, 1] and weights of the 6-point Gauss–Legendre rule.
 pub(crate) const GAUSS_6: [[f64; 2]; 6] = [
@@ -53,9 +53,9 @@ pub(crate) const GAUSS_6: [[f64; 2]; 6] = [
 ];
 
 /// Optical depth that one panel of 6 nodes covers.
-pub(crate) const PANEL: f64 = 4.0;
-/// Optical depth up to which [`Piece::mild`] holds.
-pub(crate) const MILD: f64 = 1.0;
+pub(crate) const GAUSS_DEPTH: f64 = 4.0;
+/// Optical depth up to which [`Piece::by_series`] holds.
+pub(crate) const SERIES_DEPTH: f64 = 1.0;
 
 /// 1 − e^{−depth}, accurate relative to itself.
 #[inline(always)]
@@ -106,7 +106,7 @@ fn gauss<A: Real, const N: usize>(
 impl<R: Real> Piece<R> {
     const NONE: fn() -> Self = || Piece { alpha: R::of(0.0), front: R::of(0.0), back: R::of(0.0) };
 
-    /// As [`Piece::new`] for depths up to [`MILD`]; takes no decisions, so that a loop over it becomes vector
+    /// As [`Piece::new`] for depths up to [`SERIES_DEPTH`]; takes no decisions, so that a loop over it becomes vector
     /// instructions.
     ///
     /// With the mean depth D = (x + y)/2, δ = y − x and v = u − ½ it is e^{−T(u)} = e^{−D/2} e^{−Dv} e^{δ(¼−v²)/2}. So
@@ -114,7 +114,7 @@ impl<R: Real> Piece<R> {
     /// which converge fast. By parts, ∫ v e^{−T} du = −D (Ψ − e^{−D/2} N₀)/δ and ∫ u T′ e^{−T} du = Ψ − e^{−D}, of
     /// whose terms the ones of N₀ and of q = 1 − e^{−D/2} cancel by hand.
     #[inline(always)]
-    fn mild(x: R, y: R, direct: bool) -> Self {
+    fn by_series(x: R, y: R, direct: bool) -> Self {
         let (one, half, of) = (R::of(1.0), R::of(0.5), R::of);
         let (depth, rise) = ((x + y) * half, y - x);
         let (square, h) = (depth * depth, depth * half);
@@ -138,9 +138,9 @@ impl<R: Real> Piece<R> {
         Piece { alpha, front: alpha - back, back }
     }
 
-    /// As [`Piece::new`] for depths up to [`PANEL`], as [`Self::mild`].
+    /// As [`Piece::new`] for depths up to [`GAUSS_DEPTH`], as [`Self::by_series`].
     #[inline(always)]
-    fn moderate(x: R, y: R, direct: bool) -> Self {
+    fn by_gauss(x: R, y: R, direct: bool) -> Self {
         gauss(&GAUSS_6, x, y, R::of(0.0), R::of(1.0), direct, Self::NONE())
     }
 
@@ -151,16 +151,16 @@ impl<R: Real> Piece<R> {
         let (zero, one) = (R::of(0.0), R::of(1.0));
         let (x, y) = (x.max(zero), y.max(zero));
         let steepest = x.max(y);
-        if steepest <= R::of(MILD) {
-            return Piece::mild(x, y, direct);
+        if steepest <= R::of(SERIES_DEPTH) {
+            return Piece::by_series(x, y, direct);
         }
-        if steepest <= R::of(PANEL) {
-            return Piece::moderate(x, y, direct);
+        if steepest <= R::of(GAUSS_DEPTH) {
+            return Piece::by_gauss(x, y, direct);
         }
-        // Beyond T(u) = DEEP nothing is seen: x u + (y − x) u²/2 = DEEP.
-        let deep = R::of(2.0 * DEEP);
+        // Beyond T(u) = OPAQUE_DEPTH nothing is seen: x u + (y − x) u²/2 = OPAQUE_DEPTH.
+        let deep = R::of(2.0 * OPAQUE_DEPTH);
         let end = if x + y > deep { (deep / (x + (x * x + deep * (y - x)).max(zero).sqrt())).min(one) } else { one };
-        let panels = (x.max(x + (y - x) * end) * end / R::of(PANEL)).truncate() + 1;
+        let panels = (x.max(x + (y - x) * end) * end / R::of(GAUSS_DEPTH)).truncate() + 1;
         let width = end / R::of(f64::from(panels));
         let mut sum = Self::NONE();
         for p in 0..panels {

@@ -1,7 +1,7 @@
 //! Shader assembly: fragments of WGSL joined into programs, after a prelude of what Rust knows.
 
 use crate::field::Kind;
-use crate::integral::{BUCKETS, DEEP, MILD, OPAQUE_EXTINCTION};
+use crate::integral::{BUCKETS, OPAQUE_DEPTH, OPAQUE_EXTINCTION, SERIES_DEPTH};
 use std::fmt::Write;
 
 pub(crate) const CELL: &str = include_str!("../../shaders/cell.wgsl");
@@ -31,7 +31,8 @@ pub(crate) fn prelude(variant: &Variant) -> String {
     let mut text = String::new();
     let number = |x: f64| format!("{x:?}f");
     let mut constant = |name: &str, value: String| text += &format!("const {name} = {value};\n");
-    for (name, value) in [("DEEP", DEEP), ("MILD", MILD), ("OPAQUE", OPAQUE_EXTINCTION)] {
+    for (name, value) in [("OPAQUE_DEPTH", OPAQUE_DEPTH), ("SERIES_DEPTH", SERIES_DEPTH), ("OPAQUE", OPAQUE_EXTINCTION)]
+    {
         constant(name, number(value));
     }
     // Four units in the last place, as in cell.rs; and what is as good as 0 but far above the smallest f32.

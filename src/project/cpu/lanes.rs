@@ -1,6 +1,6 @@
 //! The vectors of the sweep, and what pieces of rays emit and absorb in them: the equations are those of [`crate::integral`].
 
-use crate::integral::{GAUSS_6, MILD, PANEL, Piece};
+use crate::integral::{GAUSS_6, GAUSS_DEPTH, Piece, SERIES_DEPTH};
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, u32x16};
 
@@ -22,14 +22,14 @@ pub(super) fn piece<S: Simd>(simd: S, x: Floats<S>, y: Floats<S>, direct: bool) 
     if !direct && most(FAINT) == 0 {
         return faint(simd, x, y);
     }
-    if most(MILD as f32) == 0 {
+    if most(SERIES_DEPTH as f32) == 0 {
         return mild(simd, x, y, direct);
     }
     let [alpha, front, back] = moderate(simd, x, y, direct);
-    let deep = most(PANEL as f32);
+    let deep = most(GAUSS_DEPTH as f32);
     // Faint lanes beside deeper ones keep their digits.
     let [a, f, b] = mild(simd, x, y, direct);
-    let near = steepest.simd_le(Floats::splat(simd, MILD as f32));
+    let near = steepest.simd_le(Floats::splat(simd, SERIES_DEPTH as f32));
     let all = [near.select(a, alpha), near.select(f, front), near.select(b, back)];
     if deep == 0 { all } else { deeper(simd, x, y, direct, deep, all) }
 }
@@ -61,7 +61,7 @@ fn series<S: Simd, const K: usize>(simd: S, x: Floats<S>, c: &[f32; K]) -> Float
     sum
 }
 
-/// Up to a depth of 1: `Piece::mild`.
+/// Up to a depth of 1: `Piece::by_series`.
 #[inline(always)]
 fn mild<S: Simd>(simd: S, x: Floats<S>, y: Floats<S>, direct: bool) -> [Floats<S>; 3] {
     const Q: [f32; 8] =
