@@ -2,7 +2,7 @@
 
 /// All rays of a frame, as in traverse.wgsl, but seen from `base`: the place where the middle one starts. Coordinates
 /// are the mesh's normalised ones, relative to it.
-struct Frame {
+struct ViewUniforms {
     /// The base as the sum of two numbers, the second much smaller.
     base: vec4f,
     base_low: vec4f,
@@ -31,7 +31,7 @@ struct Frame {
     unused: vec2f,
 }
 
-@group(0) @binding(3) var<uniform> frame: Frame;
+@group(0) @binding(3) var<uniform> frame: ViewUniforms;
 /// Clipping planes: dot(p, plane.xyz) + plane.w ≥ 0 is kept.
 @group(0) @binding(4) var<storage, read> planes: array<vec4f>;
 /// Where each ray ends, for want of something nearer.

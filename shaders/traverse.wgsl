@@ -20,7 +20,7 @@ struct Box {
 
 /// All rays of a frame: that of column x and row y starts at origin · (1, x, y) and runs along direction · (1, x, y);
 /// coordinates are the mesh's normalised ones.
-struct Frame {
+struct RayUniforms {
     origin: array<DoubleSingle, 3>,
     direction: array<DoubleSingle, 3>,
     /// Width and height of the image, in pixels.
@@ -52,7 +52,7 @@ struct Counts {
     unused: u32,
 }
 
-@group(0) @binding(3) var<uniform> frame: Frame;
+@group(0) @binding(3) var<uniform> frame: RayUniforms;
 /// Clipping planes: dot(p, plane.xyz) + plane.w ≥ 0 is kept.
 @group(0) @binding(4) var<storage, read> planes: array<vec4f>;
 /// Where each ray ends, for want of something nearer.

@@ -70,7 +70,7 @@ impl Batch {
             (*x, *y) = ((front[0] * length).max(0.0), (back[0] * length).max(0.0));
         }
         let all_thin = x.iter().zip(&y).all(|(x, y)| x.max(*y) <= SERIES_DEPTH as f32);
-        let pieces = match (all_thin, direct) {
+        let computed = match (all_thin, direct) {
             (true, false) => many(&x, &y, self.len, |x, y| Piece::by_series(x, y, false)),
             (true, true) => many(&x, &y, self.len, |x, y| Piece::by_series(x, y, true)),
             (false, false) => many(&x, &y, self.len, |x, y| Piece::by_gauss(x, y, false)),
@@ -80,7 +80,7 @@ impl Batch {
             let piece = if x[i].max(y[i]) > GAUSS_DEPTH as f32 {
                 Piece::new(x[i], y[i], direct)
             } else {
-                Piece { alpha: pieces[0][i], front: pieces[1][i], back: pieces[2][i] }
+                Piece { alpha: computed[0][i], front: computed[1][i], back: computed[2][i] }
             };
             let l = if direct { *length } else { 1.0 };
             light.add([1, 2, 3].map(|k| (f[k] * piece.front + b[k] * piece.back) * l), piece.alpha);

@@ -26,7 +26,7 @@ use crate::order::mpvo::Mpvo;
 use crate::view::{Blend, View};
 use bytemuck::{Pod, Zeroable};
 use drawing::Canvas;
-use frame::Seen;
+use frame::SeenView;
 use ordering::{Ordered, Sequenced, Sequencing};
 use program::{Drawn, Program, program};
 use record::Layout;
@@ -230,7 +230,7 @@ impl Project {
         self.prepare_table(exact, table)?;
         let association = arrays::association(values);
         let arrays = self.arrays()?;
-        let seen = Seen::new(geometry, view);
+        let seen = SeenView::new(geometry, view);
         let is_rare = options.fragments == Fragments::Intersected && (options.dithers() || seen.limits().any());
         let has_line = table.is_none() && !is_maximum && exact.kind != Kind::Pair;
         let layout = Layout::new(options.fragments, exact.kind.components(), has_line, is_rare);
@@ -327,7 +327,7 @@ struct Pass {
 }
 
 impl Pass {
-    fn new(project: &Project, seen: &Seen) -> Result<Self> {
+    fn new(project: &Project, seen: &SeenView) -> Result<Self> {
         let gpu = &project.gpu;
         let (Some(FunctionBuffers { buffers: function, lines, bins, .. }), Some(program), Some(table)) =
             (&project.function, project.programs.first(), project.table.get())

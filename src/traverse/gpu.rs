@@ -67,10 +67,10 @@ const CLOSE: f32 = 2e-7;
 /// How far rays that are traced again are moved, in normalised units.
 const PERTURBATION: f32 = 2e-7;
 
-/// `Frame` in the shader.
+/// `RayUniforms` in the shader.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
-struct Frame {
+struct RayUniforms {
     origin: [[[f32; 4]; 2]; 3],
     direction: [[[f32; 4]; 2]; 3],
     size: [u32; 2],
@@ -276,7 +276,7 @@ impl Traverse {
         let fan = view.fan(geometry.centre, geometry.scale, NEAR_EYE);
         let planes = rays::planes(view, geometry, DVec3::ZERO);
         let ends = rays::ends(view, &fan, geometry.scale, true);
-        let frame = Frame {
+        let frame = RayUniforms {
             origin: rays::affine(fan.by_pixel(fan.origin, [w, h])),
             direction: rays::affine(fan.by_pixel(fan.direction, [w, h])),
             size: [w, h],
@@ -293,7 +293,8 @@ impl Traverse {
         };
         let rows = (RAYS / u64::from(w)).clamp(1, u64::from(h)) as u32;
         let size = u64::from(w) * u64::from(rows) * 16;
-        let frame_buffer = Buffer::new(gpu, "frame", size_of::<Frame>() as u64, Usage::UNIFORM | Usage::COPY_DST)?;
+        let frame_buffer =
+            Buffer::new(gpu, "frame", size_of::<RayUniforms>() as u64, Usage::UNIFORM | Usage::COPY_DST)?;
         let planes = Buffer::holding(gpu, "planes", &planes, Usage::STORAGE)?;
         let ends = Buffer::holding(gpu, "ends", &ends, Usage::STORAGE)?;
         let pixels = Buffer::new(gpu, "pixels", size, Usage::STORAGE | Usage::COPY_SRC)?;
@@ -311,7 +312,7 @@ impl Traverse {
             Drawn { pixels: Vec::with_capacity(w as usize * h as usize), counts: Counts::default(), device_ms: None };
         for first_row in (0..h).step_by(rows as usize) {
             let rows = rows.min(h - first_row);
-            frame_buffer.write(gpu, 0, bytemuck::bytes_of(&Frame { first_row, rows, ..frame }));
+            frame_buffer.write(gpu, 0, bytemuck::bytes_of(&RayUniforms { first_row, rows, ..frame }));
             let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
             encoder.clear_buffer(&counts.raw, 0, None);
             {

@@ -1,7 +1,7 @@
 //! Order by the power of the eye with respect to the cells' circumspheres, which the host finds in f64: spheres of slivers and
 //! of cells far away ask for that.
 
-use super::frame::Seen;
+use super::frame::SeenView;
 use crate::geometry::TetMesh;
 use crate::gpu::rays::FAR;
 use crate::order::MOST_PARTS;
@@ -25,7 +25,7 @@ fn power(p: [DVec3; 4], forward: Option<DVec3>) -> f64 {
 }
 
 /// `keys` by rank, from the farthest cell on: with as many parts, and hidden where they are.
-pub(super) fn ranked(geometry: &TetMesh, seen: &Seen, keys: &[u32]) -> Vec<u32> {
+pub(super) fn ranked(geometry: &TetMesh, seen: &SeenView, keys: &[u32]) -> Vec<u32> {
     let (eye, parallel) = (seen.eye.unwrap_or_default(), seen.eye.is_none().then_some(seen.direction));
     let power = |cell: usize| power(geometry.cells[cell].corners.map(|c| geometry.points[c as usize] - eye), parallel);
     let cells = keys.par_iter().enumerate().filter(|(_, key)| **key != HIDDEN);

@@ -16,10 +16,10 @@ pub(super) const GROWTH: f32 = 1.0 / 256.0;
 /// special.
 const NEAREST: f64 = 1e-4;
 
-/// `Frame` in the shaders.
+/// `ViewUniforms` in the shaders.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct Frame {
+pub(super) struct ViewUniforms {
     base: [f32; 4],
     base_low: [f32; 4],
     across: [[f32; 4]; 2],
@@ -39,8 +39,8 @@ pub(super) struct Frame {
 }
 
 /// A view as the shaders see it.
-pub(super) struct Seen {
-    pub(super) frame: Frame,
+pub(super) struct SeenView {
+    pub(super) frame: ViewUniforms,
     pub(super) perspective: bool,
     /// The eye of a perspective view in normalised coordinates, and the direction of the view.
     pub(super) eye: Option<DVec3>,
@@ -70,7 +70,7 @@ impl Limits {
     }
 }
 
-impl Seen {
+impl SeenView {
     pub(super) fn limits(&self) -> Limits {
         let frame = &self.frame;
         // In perspective views the eye is a limit anyway.
@@ -95,7 +95,7 @@ impl Seen {
         let inverse = DMat3::from_cols(spans[0], spans[1], fan.direction[0]).inverse();
         let planes = rays::planes(view, geometry, base);
         let ends = rays::ends(view, &fan, geometry.scale, false);
-        let frame = Frame {
+        let frame = ViewUniforms {
             base: four(high, 0.0),
             base_low: four(base - high, 0.0),
             across: [0, 1].map(|k| four(inverse.row(k), 0.0)),
@@ -114,6 +114,6 @@ impl Seen {
             pixel: [2.0 / view.size()[0] as f32, -2.0 / view.size()[1] as f32],
         };
         let eye = view.eye().map(|eye| (eye - geometry.centre) * geometry.scale);
-        Seen { frame, perspective, eye, direction: view.forward(), planes, ends }
+        SeenView { frame, perspective, eye, direction: view.forward(), planes, ends }
     }
 }

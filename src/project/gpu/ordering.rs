@@ -1,6 +1,6 @@
 //! Which cells are seen, and in which order they are drawn.
 
-use super::frame::{Frame, Seen};
+use super::frame::{SeenView, ViewUniforms};
 use super::{Pass, Project, Slice, circumsphere, groups_of, unprepared};
 use crate::error::{Error, Result};
 use crate::geometry::TetMesh;
@@ -30,7 +30,7 @@ pub(super) struct Sequencing {
 
 /// The order of a frame, and what it holds for.
 pub(super) struct Ordered {
-    frame: Frame,
+    frame: ViewUniforms,
     planes: Vec<[f32; 4]>,
     asked: Sequencing,
     /// Cells, and entries: one for each part of a cell; and the buffers that they are in, so many in each.
@@ -41,7 +41,7 @@ pub(super) struct Ordered {
 }
 
 impl Ordered {
-    pub(super) fn holds_for(&self, seen: &Seen, asked: Sequencing) -> bool {
+    pub(super) fn holds_for(&self, seen: &SeenView, asked: Sequencing) -> bool {
         self.frame == seen.frame && self.planes == seen.planes && self.asked == asked
     }
 
@@ -53,14 +53,14 @@ impl Ordered {
 
 /// The order of all cells of the mesh, and what it holds for.
 pub(super) struct Sequenced {
-    frame: Frame,
+    frame: ViewUniforms,
     rule: Rule,
     pub(super) cells: Sequence,
 }
 
 impl Project {
     /// Finds the order of the mesh, unless it is known.
-    pub(super) fn find_sequence(&mut self, geometry: &TetMesh, view: &View, seen: &Seen, rule: Rule) {
+    pub(super) fn find_sequence(&mut self, geometry: &TetMesh, view: &View, seen: &SeenView, rule: Rule) {
         if !self.sequence.as_ref().is_some_and(|s| s.frame == seen.frame && s.rule == rule) {
             let cells = self.mpvo.sequence(geometry, view, rule);
             self.sequence = Some(Sequenced { frame: seen.frame, rule, cells });
@@ -71,7 +71,7 @@ impl Project {
     pub(super) fn order(
         &mut self,
         frame: &Pass,
-        seen: &Seen,
+        seen: &SeenView,
         geometry: &TetMesh,
         asked: Sequencing,
     ) -> Result<Ordered> {

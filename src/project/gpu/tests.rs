@@ -8,7 +8,7 @@ use crate::integral::lookup::tests::{choices, exact};
 use crate::mesh::{cells::Tetrahedra, generate};
 use crate::order::MOST_PARTS;
 use crate::order::depth::{self, HIDDEN};
-use crate::project::gpu::frame::{Frame, Limits};
+use crate::project::gpu::frame::{Limits, ViewUniforms};
 use crate::project::{Compositing, Order};
 use crate::render::{Engine, Renderer};
 use crate::transfer::{Emission, TransferFunction};
@@ -90,7 +90,7 @@ fn layouts_match_their_rust_twins() {
             let rust = [
                 ("Record", layout.bytes()),
                 ("Vertex", layout.part_bytes()),
-                ("Frame", size_of::<Frame>() as u64),
+                ("ViewUniforms", size_of::<ViewUniforms>() as u64),
                 ("Part", size_of::<Slice>() as u64),
                 ("Point", 24),
             ];

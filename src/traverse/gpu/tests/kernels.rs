@@ -51,7 +51,7 @@ fn layouts_match_their_rust_twins() {
     check!("Knot", Knot, value slope ends);
     check!("Function", Function, opacity color end scale);
     check!("Counts", RawCounts, steps carry retraced unused);
-    check!("Frame", Frame, origin direction size first_row rows near far planes has_ends leaves faces most_steps most_work);
+    check!("RayUniforms", RayUniforms, origin direction size first_row rows near far planes has_ends leaves faces most_steps most_work);
     check("Point", 24, &[0, 8, 16]);
 }
 
