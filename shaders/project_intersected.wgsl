@@ -5,7 +5,7 @@
 // 3    that middle, nothing, and bits: which facets are entered, and, of 16, whether the last is the reference that the
 //      others count from;
 // 4–5  the stretch of rays around it, times the cell's depth; and the longest edge;
-// then, where anything cuts rays off or is dithered, the nearnesses between which they are seen, the cell's depth (t in a
+// then, where anything cuts rays off or is dithered, the inverse depths between which they are seen, the cell's depth (t in a
 // parallel view) and the rank; and the line of the function that the least value is on.
 // The values: in the middle; how it rises from pixel to pixel to the right and down, and towards the eye; the least and
 // the greatest.
@@ -219,7 +219,7 @@ fn write_record(i: u32, solid: Solid, own_values: array<Value, 4>, piece: u32, r
     // eye.
     var t = dot(centroid, frame.forward.xyz);
     if PERSPECTIVE {
-        // Around the eye, as far as the cell goes: nearnesses of what is much farther cancel.
+        // Around the eye, as far as the cell goes: inverse depths of what is much farther cancel.
         t = max(t, max(frame.nearest, 0.5 * longest) - frame.forward.w);
     }
     // Few digits, so that products with it are exact.
@@ -266,7 +266,7 @@ fn write_record(i: u32, solid: Solid, own_values: array<Value, 4>, piece: u32, r
     var to_right: Value;
     var to_below: Value;
     var towards_eye: Value;
-    // Nearnesses of a flat cell's faces differ by little, and their differences by their common edges do not cancel:
+    // Inverse depths of a flat cell's faces differ by little, and their differences by their common edges do not cancel:
     // n_j × n_d is an edge, times the volume.
     let reference = vec3f(heights.w, across.w, along_rows.w) / slopes.w;
     let thickness = volume / slopes.w;

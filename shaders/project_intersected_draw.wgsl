@@ -10,7 +10,7 @@ struct Facets {
     down: vec4f,
 }
 
-/// Where a ray enters and leaves, as nearnesses that count from `reference`; it misses if the first is not greater.
+/// Where a ray enters and leaves, as inverse depths that count from `reference`; it misses if the first is not greater.
 struct Crossing {
     near: vec2f,
     reference: f32,
@@ -19,17 +19,17 @@ struct Crossing {
 /// The crossing of the ray of the pixel `offset` away, within `limits`. Which faces are entered is the same for all rays
 /// that meet the tetrahedron.
 fn crossing(facets: Facets, is_reference: bool, entered: vec4<bool>, offset: vec2f, limits: vec2f) -> Crossing {
-    var nearness = fma(facets.down, vec4f(offset.y), fma(facets.right, vec4f(offset.x), facets.at));
-    let reference = select(0.0, nearness.w, is_reference);
-    nearness.w = select(nearness.w, 0.0, is_reference);
-    let first = select(vec4f(limits.x - reference), nearness, entered);
-    let last = select(nearness, vec4f(limits.y - reference), entered);
+    var inverse_depth = fma(facets.down, vec4f(offset.y), fma(facets.right, vec4f(offset.x), facets.at));
+    let reference = select(0.0, inverse_depth.w, is_reference);
+    inverse_depth.w = select(inverse_depth.w, 0.0, is_reference);
+    let first = select(vec4f(limits.x - reference), inverse_depth, entered);
+    let last = select(inverse_depth, vec4f(limits.y - reference), entered);
     let near = vec2f(min(min(first.x, first.y), min(first.z, first.w)), max(max(last.x, last.y), max(last.z, last.w)));
     return Crossing(near, reference);
 }
 
 /// How much nearer than the middle of a cell, at `depth` (t in a parallel view), the ray's points at `t` are.
-fn nearness_at(t: vec2f, stretch: f32, depth: f32) -> vec2f {
+fn inverse_depth_at(t: vec2f, stretch: f32, depth: f32) -> vec2f {
     let along = t / stretch;
     return select(depth - along, depth / max(along + frame.forward.w, vec2f(AT_EYE)) - 1.0, PERSPECTIVE);
 }
@@ -46,7 +46,7 @@ fn fragment(drawn: VertexOutput) -> Fragment {
         let xy = sample_of(at);
         let direction = direction_at(xy);
         let stretch = length(direction);
-        let nearest = nearness_at(limits_of(at, origin_at(xy), direction / stretch, stretch), stretch, rare.z);
+        let nearest = inverse_depth_at(limits_of(at, origin_at(xy), direction / stretch, stretch), stretch, rare.z);
         limits = vec2f(min(limits.x, nearest.x), max(limits.y, nearest.y));
     }
     let bits = u32(words[3].w);
@@ -57,7 +57,7 @@ fn fragment(drawn: VertexOutput) -> Fragment {
     if !is_met {
         discard;
     }
-    // What nearnesses are divided by: see Facets.
+    // What inverse depths are divided by: see Facets.
     let divisors = select(vec2f(1.0), (1.0 + met.reference) + near, PERSPECTIVE);
     let share = divisors.yx * (1.0 / (divisors.x * divisors.y));
     let stretch = stretch_of(words[4].xyz, words[5].xyz, offset);
