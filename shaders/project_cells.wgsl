@@ -16,7 +16,7 @@ struct Part {
 @group(2) @binding(2) var<storage, read_write> keys: array<u32>;
 /// Cells from back to front, and, from bit PART on, how many parts of the cell came before.
 @group(2) @binding(3) var<storage, read> order: array<u32>;
-@group(2) @binding(4) var<storage, read_write> records: array<Record>;
+@group(2) @binding(4) var<storage, read_write> primitives: array<Primitive>;
 
 /// Relative to the frame's base.
 fn place(p: Point) -> vec3f {
@@ -167,7 +167,7 @@ fn project_all(@builtin(global_invocation_id) id: vec3u) {
     let entry = order[part.first + i];
     let cell = entry & ((1u << PART) - 1u);
     let corners = cells(cell);
-    write_record(i, solid_of(corners), values_of(cell, corners), entry >> PART, part.rank + i);
+    write_primitive(i, solid_of(corners), values_of(cell, corners), entry >> PART, part.rank + i);
 }
 
 /// How the four directions from the eye to the corners depend on each other: Σ a p = 0, the sum of a being six volumes.

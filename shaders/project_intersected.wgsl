@@ -1,6 +1,6 @@
 // The form that intersects each pixel's ray with the cell: the outline only says which pixels may be met.
 
-// The words of a record:
+// The attributes of a primitive:
 // 0–2  the cell's facets, counted from the middle of a pixel amid it;
 // 3    that middle, nothing, and bits: which facets are entered, and, of 16, whether the last is the reference that the
 //      others count from;
@@ -182,7 +182,7 @@ fn ending_with(last: u32) -> vec4u {
 }
 
 /// A cell is drawn as a whole: there is no `piece` but the first.
-fn write_record(i: u32, solid: Solid, own_values: array<Value, 4>, piece: u32, rank: u32) {
+fn write_primitive(i: u32, solid: Solid, own_values: array<Value, 4>, piece: u32, rank: u32) {
     let p = solid.p;
     var around: array<vec2f, 4>;
     let corners = array<vec3f, 4>(seen(p[0]), seen(p[1]), seen(p[2]), seen(p[3]));
@@ -304,26 +304,26 @@ fn write_record(i: u32, solid: Solid, own_values: array<Value, 4>, piece: u32, r
         facets = array<vec4f, 3>(heights / slopes, across / slopes, along_rows / slopes);
     }
     heights += PERTURBATION.x * across + PERTURBATION.y * along_rows;
-    var words: array<vec4f, 6>;
-    words[0] = select(facets[0], heights / FLAT, edge_on);
-    words[1] = select(facets[1], across / FLAT, edge_on);
-    words[2] = select(facets[2], along_rows / FLAT, edge_on);
+    var attributes: array<vec4f, 6>;
+    attributes[0] = select(facets[0], heights / FLAT, edge_on);
+    attributes[1] = select(facets[1], across / FLAT, edge_on);
+    attributes[2] = select(facets[2], along_rows / FLAT, edge_on);
     let bits = select(vec4u(0u), vec4u(1u, 2u, 4u, 8u), entered);
     if !(abs(volume) > FLAT) {
         around = array<vec2f, 4>(vec2f(-9.0), vec2f(-9.0), vec2f(-9.0), vec2f(-9.0));
     }
-    words[3] = vec4f(centre, 0.0, f32(bits.x | bits.y | bits.z | bits.w | select(0u, 16u, is_measured)));
+    attributes[3] = vec4f(centre, 0.0, f32(bits.x | bits.y | bits.z | bits.w | select(0u, 16u, is_measured)));
     let stretch = stretch_around(way.high, depth);
-    words[4] = vec4f(stretch[0], longest);
-    words[5] = vec4f(stretch[1], 0.0);
+    attributes[4] = vec4f(stretch[0], longest);
+    attributes[5] = vec4f(stretch[1], 0.0);
     var limits = vec2f(t - frame.near, t - frame.far);
     if PERSPECTIVE {
         limits = depth / max(vec2f(frame.near, frame.far) + frame.forward.w, vec2f(AT_EYE)) - 1.0;
     }
     let rare = vec4f(limits, select(t, depth, PERSPECTIVE), f32(rank & 0xffffffu));
-    store(i, words, rare, last_of(low), last_of(high), Values(middle, to_right, to_below, towards_eye, low, high));
-    records[i].vertices[0].corner = around[0];
-    records[i].vertices[1].corner = around[1];
-    records[i].vertices[2].corner = around[2];
-    records[i].vertices[3].corner = around[3];
+    store(i, attributes, rare, last_of(low), last_of(high), Values(middle, to_right, to_below, towards_eye, low, high));
+    primitives[i].vertices[0].corner = around[0];
+    primitives[i].vertices[1].corner = around[1];
+    primitives[i].vertices[2].corner = around[2];
+    primitives[i].vertices[3].corner = around[3];
 }

@@ -2,15 +2,15 @@
 //!
 //! 1. `classify` (compute) finds the cells that are seen, and a key of depth for each.
 //! 2. These are put in order: by the keys, which the device sorts where it can; or that of the mesh, which the host finds.
-//! 3. Batch by batch, in that order, `project` (compute) makes a record of each cell, and the records are drawn.
+//! 3. Batch by batch, in that order, `project` (compute) makes a primitive of each cell, and the primitives are drawn.
 
 mod circumsphere;
 mod drawing;
 mod frame;
 mod lines;
 mod ordering;
+mod primitive;
 mod program;
-mod record;
 
 use super::{Counts, Fragments, Order, ProjectionOptions, Target};
 use crate::error::{Error, Result};
@@ -28,13 +28,13 @@ use bytemuck::{Pod, Zeroable};
 use drawing::Canvas;
 use frame::SeenView;
 use ordering::{Ordered, Sequenced, Sequencing};
+use primitive::Layout;
 use program::{Drawn, Program, program};
-use record::Layout;
 use std::sync::Arc;
 use std::time::Instant;
 use wgpu::{BufferUsages as Usage, ShaderStages as Stages};
 
-/// Records of one batch.
+/// Primitives of one batch.
 const BATCH: usize = 1 << 17;
 
 /// The arrays that the compute stages read, and what WGSL calls their elements.
@@ -311,10 +311,10 @@ impl Project {
         slice: wgpu::BindingResource,
         keys: &Buffer,
         order: &Buffer,
-        records: wgpu::BindingResource,
+        primitives: wgpu::BindingResource,
     ) -> wgpu::BindGroup {
         let [keys, order] = [keys, order].map(|b| b.raw.as_entire_binding());
-        raster::group(&self.gpu, &self.own, [slice, frame.bins.as_entire_binding(), keys, order, records])
+        raster::group(&self.gpu, &self.own, [slice, frame.bins.as_entire_binding(), keys, order, primitives])
     }
 }
 

@@ -1,6 +1,6 @@
 //! Projecting and drawing the batches of a frame.
 
-use super::record::Layout;
+use super::primitive::Layout;
 use super::{BATCH, Pass, Project, Slice, groups_of, unprepared};
 use crate::error::Result;
 use crate::gpu::buffers::Buffer;
@@ -19,7 +19,7 @@ pub(super) struct Canvas {
     layout: Layout,
     size: [u32; 2],
     format: wgpu::TextureFormat,
-    records: Buffer,
+    primitives: Buffer,
     indices: Buffer,
     picture: Texture,
     /// Where the greatest of something is kept, how great that is.
@@ -48,8 +48,13 @@ impl Project {
         let texture =
             |name, format, usage| Texture::new(gpu, name, wgpu::TextureDimension::D2, [w, h, 1], format, usage);
         let canvas = Canvas {
-            // One more, as the last one's vertices look for words beyond it.
-            records: Buffer::new(gpu, "records", layout.bytes() * (BATCH as u64 + 1), Usage::STORAGE | Usage::VERTEX)?,
+            // One more, as the last one's vertices look for attributes beyond it.
+            primitives: Buffer::new(
+                gpu,
+                "primitives",
+                layout.bytes() * (BATCH as u64 + 1),
+                Usage::STORAGE | Usage::VERTEX,
+            )?,
             indices: Buffer::holding(gpu, "indices", &all, Usage::INDEX)?,
             picture: texture("picture", format, TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC)?,
             depth: keeps_greatest
@@ -97,7 +102,7 @@ impl Project {
                 size: std::num::NonZeroU64::new(size_of::<Slice>() as u64),
             });
             let order = &ordered.chunks[first / ordered.chunk];
-            let own = self.own_group(frame, slice, &none, order, canvas.records.raw.as_entire_binding());
+            let own = self.own_group(frame, slice, &none, order, canvas.primitives.raw.as_entire_binding());
             {
                 let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
                     label: Some("project"),
@@ -122,7 +127,7 @@ impl Project {
                 pass.set_bind_group(0, &frame.shared, &[]);
                 for part in 0..program.layout.parts {
                     let from = u64::from(part) * program.layout.part_bytes();
-                    pass.set_vertex_buffer(part, canvas.records.raw.slice(from..));
+                    pass.set_vertex_buffer(part, canvas.primitives.raw.slice(from..));
                 }
                 pass.set_index_buffer(canvas.indices.raw.slice(..), wgpu::IndexFormat::Uint32);
                 let counter = clock.as_ref().and_then(|c| c.fragments.as_ref()).filter(|_| i < CLOCKS as usize / 4);

@@ -140,8 +140,8 @@ impl Project {
         let slice = Slice { first: first as u32, count: count as u32, row, rank: 0 };
         let slice = Buffer::holding(gpu, "slice", &[slice], Usage::UNIFORM)?;
         let none = [Buffer::new(gpu, "none", 16, Usage::STORAGE)?, Buffer::new(gpu, "none", 512, Usage::STORAGE)?];
-        let records = none[1].raw.as_entire_binding();
-        let own = self.own_group(frame, slice.raw.as_entire_binding(), &keys, &none[0], records);
+        let primitives = none[1].raw.as_entire_binding();
+        let own = self.own_group(frame, slice.raw.as_entire_binding(), &keys, &none[0], primitives);
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         {
             let mut pass = encoder.begin_compute_pass(&Default::default());

@@ -3,7 +3,7 @@
 use super::Project;
 use super::frame::{GROWTH, Limits};
 use super::lines::{BINS, LINES_ACROSS};
-use super::record::Layout;
+use super::primitive::Layout;
 use crate::error::Result;
 use crate::gpu::arrays;
 use crate::gpu::raster::{self, Slot};
@@ -22,7 +22,7 @@ const CELLS: &str = include_str!("../../../shaders/project_cells.wgsl");
 const LINES: &str = include_str!("../../../shaders/project_lines.wgsl");
 const SHADE: &str = include_str!("../../../shaders/project_shade.wgsl");
 
-/// For each form: its records, and how they are drawn.
+/// For each form: its primitives, and how they are drawn.
 const INTERSECTED: [&str; 2] = [
     include_str!("../../../shaders/project_intersected.wgsl"),
     include_str!("../../../shaders/project_intersected_draw.wgsl"),
@@ -36,11 +36,11 @@ const INTERPOLATED: [&str; 2] = [
 /// What a fragment is: light; or the larger of its two values, and a depth that rises with it. Of the value's bits, in a sequence
 /// that ascends, 29 fit between 0 and 1.
 const BLENDED: &str = "struct Fragment { @location(0) color: vec4f }
-fn fragment_of(front: Value, back: Value, length: f32, words: Words, at: vec2f, rank: u32) -> Fragment {
-    return Fragment(quantised(colored(front, back, length, words), at, rank));
+fn fragment_of(front: Value, back: Value, length: f32, attributes: Attributes, at: vec2f, rank: u32) -> Fragment {
+    return Fragment(quantised(colored(front, back, length, attributes), at, rank));
 }\n";
 const LARGEST: &str = "struct Fragment { @location(0) values: vec4f, @builtin(frag_depth) depth: f32 }
-fn fragment_of(front: Value, back: Value, length: f32, words: Words, at: vec2f, rank: u32) -> Fragment {
+fn fragment_of(front: Value, back: Value, length: f32, attributes: Attributes, at: vec2f, rank: u32) -> Fragment {
     let is_front = last_of(front) > last_of(back);
     let largest = select(back, front, is_front);
     let bits = bitcast<u32>(last_of(largest));
@@ -115,7 +115,7 @@ impl Project {
                 gpu,
                 &module,
                 &drawing,
-                (layout.part_bytes(), &layout.attributes()),
+                (layout.part_bytes(), &layout.vertex_attributes()),
                 format,
                 blend,
                 culled,
@@ -174,11 +174,11 @@ pub(super) fn program(
          const POINT = 0u;\nconst CORNER = 1u;\nconst CELL = 2u;\nconst ASSOCIATION = {association};\n"
     );
     text += arrays::POINT;
-    let [records, drawing] = if form == "INTERSECTED" { INTERSECTED } else { INTERPOLATED };
+    let [primitives, drawing] = if form == "INTERSECTED" { INTERSECTED } else { INTERPOLATED };
     text += &layout.wgsl();
     text += &shader::accessors(arrays);
     text += &table::constants(table, limits.plane_per_cell);
     text += &table::declarations(0, 6);
     text += if blend == Blend::Maximum { LARGEST } else { BLENDED };
-    [&text, shader::CELL, shader::INTEGRAL, TABLE, SHARED, LINES, CELLS, records, SHADE, drawing].join("\n")
+    [&text, shader::CELL, shader::INTEGRAL, TABLE, SHARED, LINES, CELLS, primitives, SHADE, drawing].join("\n")
 }

@@ -88,7 +88,7 @@ fn layouts_match_their_rust_twins() {
                 (u64::from(*span), members.iter().map(at).collect::<Vec<_>>())
             };
             let rust = [
-                ("Record", layout.bytes()),
+                ("Primitive", layout.bytes()),
                 ("Vertex", layout.part_bytes()),
                 ("ViewUniforms", size_of::<ViewUniforms>() as u64),
                 ("Part", size_of::<Slice>() as u64),
@@ -98,7 +98,7 @@ fn layouts_match_their_rust_twins() {
                 assert_eq!(members(name).0, size, "{name}, {kind:?}, {fragments:?}, {has_line}");
             }
             let (_, vertex) = members("Vertex");
-            let attributes = layout.attributes();
+            let attributes = layout.vertex_attributes();
             for (location, (name, offset)) in vertex.iter().enumerate() {
                 assert_eq!(attributes[0][location].offset, *offset, "{name}, {kind:?}, {fragments:?}, {has_line}");
             }
