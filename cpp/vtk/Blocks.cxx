@@ -11,6 +11,9 @@
 #include <algorithm>
 #include <array>
 
+namespace halite_vtk
+{
+
 namespace
 {
 
@@ -110,4 +113,6 @@ void Block::Sort(std::vector<Block>& blocks, vtkRenderer* renderer, const halite
     }
   }
   blocks.swap(sorted);
+}
+
 }

@@ -10,6 +10,9 @@
 
 #include <vector>
 
+namespace halite_vtk
+{
+
 // The grids that have cells: the data object itself, or the leaves of a composite one.
 inline std::vector<vtkSmartPointer<vtkDataSet>> LeavesOf(vtkDataObject* data)
 {
@@ -34,4 +37,6 @@ inline std::vector<vtkSmartPointer<vtkDataSet>> LeavesOf(vtkDataObject* data)
     add(data);
   }
   return grids;
+}
+
 }

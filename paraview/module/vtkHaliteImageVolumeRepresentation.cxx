@@ -122,7 +122,7 @@ bool vtkHaliteImageVolumeRepresentation::Connect(vtkHaliteMapper* halite)
     return false;
   }
   vtkDataObject* delivered = this->VolumeMapper->GetInputDataObject(0, 0);
-  const std::vector<vtkSmartPointer<vtkDataSet>> grids = LeavesOf(delivered);
+  const std::vector<vtkSmartPointer<vtkDataSet>> grids = halite_vtk::LeavesOf(delivered);
   if (grids.empty())
   {
     return false;
