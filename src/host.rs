@@ -111,7 +111,7 @@ impl Session {
     /// Integrates in another form from now on; as at first, exactly, until this is called.
     ///
     /// # Errors
-    /// [`Error::Render`] if there can be no table of that form. What the form does not read is not judged.
+    /// [`Error::Render`] if there can be no table of that form. What the form does not read is not checked.
     pub fn set_integral(&mut self, choice: IntegrationOptions) -> Result<()> {
         choice.check(choice.size(0))?;
         self.renderer.set_integral(choice);

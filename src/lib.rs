@@ -15,7 +15,7 @@
 //!
 //! [`render::Renderer`] is the whole flow behind one door, [`host::Session`] that door inside another program; with the
 //! feature `ffi` it opens to C++. [`scene`] describes a picture in a JSON file, and
-//! [`mod@reference`] is the slow float64 second opinion that the tests judge the engines by.
+//! [`mod@reference`] is the slow float64 renderer that the tests compare the engines with.
 
 pub mod cast;
 pub mod cell;

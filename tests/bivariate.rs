@@ -154,7 +154,7 @@ fn functions() -> Vec<(&'static str, TransferFunction)> {
     ]
 }
 
-/// Some pixels of each picture: the judge is slow.
+/// Some pixels of each picture: the reference is slow.
 #[test]
 fn pictures_are_the_references() {
     let mut report = Report::default();
@@ -165,12 +165,12 @@ fn pictures_are_the_references() {
             for second in [false, true] {
                 let scene = scene(mesh, transfer.clone(), second);
                 let image = Engine::Twin { threads: 2 }.image(&scene, &view);
-                let judge = Reference::new(&scene.mesh, &scene.tetrahedra, &scene.field, &scene.transfer).unwrap();
+                let reference = Reference::new(&scene.mesh, &scene.tetrahedra, &scene.field, &scene.transfer).unwrap();
                 let mut seen = false;
                 // A prime divides no width: all columns come up.
                 for i in (0..48 * 48).step_by(if second { 101 } else { 53 }) {
                     let at = [i as u32 % 48, i as u32 / 48];
-                    let wanted = judge.ray(&view.ray(at[0], at[1]), Blend::Composite);
+                    let wanted = reference.ray(&view.ray(at[0], at[1]), Blend::Composite);
                     let got = image.pixels[i];
                     let error = (0..4).map(|k| (f64::from(got[k]) - wanted[k]).abs()).fold(0.0, f64::max);
                     let case = format!("{name}, {of_mesh}{}", if second { ", an array" } else { "" });

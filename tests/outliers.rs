@@ -185,8 +185,8 @@ fn knots_may_be_anywhere() {
     let mut report = Report::default();
     for (case, scene) in scenes {
         let view = view(Blend::Composite);
-        let judged = if case == "a tiny range" { &plain } else { &scene };
-        let expected = Engine::Reference.image(judged, &view);
+        let compared = if case == "a tiny range" { &plain } else { &scene };
+        let expected = Engine::Reference.image(compared, &view);
         assert!(expected.pixels.iter().any(|p| p[3] > 0.01), "{case}: there is something to see");
         for engine in ENGINES {
             report.hold(&format!("{engine:?}, {case}"), &engine.image(&scene, &view), &expected, BOUND);

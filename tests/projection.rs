@@ -1,4 +1,4 @@
-//! The projection engine against the judge, and each of its published faults against its cure.
+//! The projection engine against the reference, and each of its published faults against its cure.
 
 #![allow(clippy::expect_used, clippy::unwrap_used, clippy::panic, clippy::print_stderr, reason = "tests")]
 
@@ -211,7 +211,7 @@ fn holes() -> (Scene, View) {
     (scene, perspective(dvec3(2.5, 1.5, 4.0), 35.0))
 }
 
-/// The error of `fault` and of `cure` in a scene, against the judge.
+/// The error of `fault` and of `cure` in a scene, against the reference.
 fn errors<const N: usize>((scene, view): &(Scene, View), variants: [ProjectionOptions; N]) -> Option<[f64; N]> {
     let mut renderer = renderer()?;
     set(&mut renderer, scene);
@@ -232,7 +232,7 @@ fn perspective_interpolation_cures_linear() {
     assert!(interpolated < 5e-4 && intersected < 1e-5);
 }
 
-/// The errors of tables of three parameters in a scene, against the judge.
+/// The errors of tables of three parameters in a scene, against the reference.
 fn table_errors<const N: usize>((scene, view): &(Scene, View), volumes: [IntegrationOptions; N]) -> Option<[f64; N]> {
     let mut renderer = renderer()?;
     set(&mut renderer, scene);

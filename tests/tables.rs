@@ -223,7 +223,7 @@ fn a_plane_serves_a_cell_in_parallel_views() {
     assert!(parallel < 2e-4 && perspective > 2.0 * parallel && perspective < 5e-2);
 }
 
-/// Forms that fields of several components are looked up by, and how far from the judge's pictures: of smooth functions at most,
+/// Forms that fields of several components are looked up by, and how far from the reference's pictures: of smooth functions at most,
 /// and of peaks and steps between texels on average.
 fn forms_of_components() -> [(IntegrationOptions, f64, f64); 4] {
     [
@@ -234,7 +234,7 @@ fn forms_of_components() -> [(IntegrationOptions, f64, f64); 4] {
     ]
 }
 
-/// Pairs and RGBA: the judge's pictures, by every form and in every engine.
+/// Pairs and RGBA: the reference's pictures, by every form and in every engine.
 #[test]
 fn colours_of_their_own_are_tabulated() {
     let mut all = renderers();

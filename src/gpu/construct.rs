@@ -1,7 +1,7 @@
 //! Pre-integrated tables, built on a device: the same texels as `integral::table` has, in `shaders/construct.wgsl`.
 //!
 //! A `Plan` says what is dispatched for a table; `Builder` does it, and leaves the texels on the device. What draws
-//! copies them into its texture there (`table`), and [`Constructor`] hands them back, to be judged.
+//! copies them into its texture there (`table`), and [`Constructor`] hands them back, to be compared.
 
 use super::buffers::Buffer;
 use super::raster::{self, Readback, Slot};

@@ -169,7 +169,7 @@ fn tables_are_judged_when_they_are_asked_for_and_then_drawn() {
     session
         .set_integral(IntegrationOptions { degree: 0, table: Some([1; 3]), ..IntegrationOptions::default() })
         .unwrap();
-    assert_eq!(draw(&mut session), exact, "what the exact integral does not read is not judged");
+    assert_eq!(draw(&mut session), exact, "what the exact integral does not read is not checked");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Pre-integrated tables: what a segment does, looked up by its values in front and behind and its length.
 //!
-//! Each form is judged by the exact integral, and read here as a device's linear filter reads it: [`Table`] has all
+//! Each form is compared with the exact integral, and read here as a device's linear filter reads it: [`Table`] has all
 //! three parameters, [`Polynomial`] the values only, and [`Cylindrical`] planes of two parameters that hold a projected
 //! cell each. [`SecondOrder`], [`SecondOrderLengths`] and [`SecondOrderPolynomial`] are for slabs along which the value is a parabola.
 //!

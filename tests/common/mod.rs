@@ -26,7 +26,7 @@ pub(crate) enum Engine {
     Sweep { threads: usize },
     /// An engine on the device to test: see [`on_device`]. Draws nothing if there is none.
     Device(render::Engine),
-    /// The judge itself, for the tests that know the answer without it.
+    /// The reference itself, for the tests that know the answer without it.
     Reference,
 }
 

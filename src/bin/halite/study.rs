@@ -139,13 +139,13 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     let given = options.request.scene()?;
     let size = options.request.studied(given.as_ref())?.or(Some([256, 256, 16]));
     let device = options.request.device(given.as_ref());
-    let mut judge = Renderer::with_device(threads, DeviceChoice::Cpu)?;
-    let job = judge.install(|| render::prepare(&options.request, given)?.of_mesh("study"))?;
+    let mut reference = Renderer::with_device(threads, DeviceChoice::Cpu)?;
+    let job = reference.install(|| render::prepare(&options.request, given)?.of_mesh("study"))?;
     let (view, _) = job.scene.view()?;
     let mut renderer = Renderer::with_engine(threads, device, halite::render::Engine::Project)?;
     let truth = progress::during("judging", |p| {
-        set(&mut judge, &job)?;
-        judge.render(&view, p)
+        set(&mut reference, &job)?;
+        reference.render(&view, p)
     })?;
     set(&mut renderer, &job)?;
     let all = variants(size);

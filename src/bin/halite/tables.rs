@@ -77,7 +77,7 @@ struct Form<'a> {
     build: Build<'a>,
 }
 
-/// A table that was built and judged.
+/// A table that was built, and its errors.
 struct Row {
     name: &'static str,
     construction: String,
@@ -170,7 +170,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     })
 }
 
-/// Builds a table, several times if that is quick, and judges it.
+/// Builds a table, several times if that is quick, and measures its errors.
 fn row(form: Form<'_>, truth: &[([f64; 3], [f64; 4])]) -> Result<Option<Row>> {
     let (mut times, begun) = (vec![], Instant::now());
     let mut last;

@@ -74,7 +74,7 @@ pub(crate) fn segments(n: usize) -> Vec<[f32; 3]> {
 }
 
 /// What f64 finds in the same table.
-pub(crate) fn judged(table: &PreintegratedTable, [front, back, l]: [f32; 3]) -> [f64; 4] {
+pub(crate) fn exact_light(table: &PreintegratedTable, [front, back, l]: [f32; 3]) -> [f64; 4] {
     let [front, back, l] = [front, back, l].map(f64::from);
     match table.stored() {
         TableData::Volume(t) => t.look_up(front, back, l),
@@ -88,7 +88,7 @@ pub(crate) fn judged(table: &PreintegratedTable, [front, back, l]: [f32; 3]) -> 
 /// The greatest of the errors of `got` against f64's look-ups, over emission where that is direct and so has no bound.
 pub(crate) fn worst(table: &PreintegratedTable, segments: &[[f32; 3]], got: &[[f32; 4]]) -> f64 {
     let errors = segments.iter().zip(got).map(|(s, got)| {
-        let want = judged(table, *s);
+        let want = exact_light(table, *s);
         (0..4).map(|k| (f64::from(got[k]) - want[k]).abs()).fold(0.0, f64::max)
     });
     errors.fold(0.0, f64::max)

@@ -145,7 +145,7 @@ fn polynomials_of_higher_degree_are_better() {
         let bands = exact(&bands, emission);
         let rms = [1, 2, 4].map(|degree| {
             let table = Polynomial::new(&bands, degree, 128, 1.0).unwrap();
-            // Between texels the values' own resolution would be judged.
+            // Between texels the values' own resolution would be measured.
             let near = |s: f64| value(((s + 1.0) * 63.5).round() as u32, 128);
             let mut sum = 0.0;
             for [front, back, l] in segments().map(|[f, b, l]| [near(f), near(b), l]) {
@@ -360,13 +360,13 @@ fn cheaper_texels_cost_what_they_should() {
 }
 
 /// A table's errors, and the bound on them.
-struct Judged<'a> {
+struct Compared<'a> {
     exact: &'a Exact<f64>,
     bound: f64,
     look_up: &'a (dyn Fn(f64, f64, f64) -> [f64; 4] + Sync),
 }
 
-impl Judged<'_> {
+impl Compared<'_> {
     fn error(&self, [f, b, l]: [f64; 3], want: [f64; 4]) -> f64 {
         let got = (self.look_up)(f, b, l);
         (0..4).fold(0.0, |m, k| m.max((got[k] - want[k]).abs()))
@@ -410,21 +410,21 @@ fn errors_are_within_their_bounds() {
         [(32, 17, 2.0), (64, 33, 2.0), (128, 65, 2.0), (64, 17, 0.05), (200, 9, 0.05), (256, 33, 2.0), (256, 9, 0.05)];
     let functions = (1..if long { 13 } else { 3 }).flat_map(functions_of);
     let cases: Vec<_> = functions.flat_map(|f| sizes.map(|size| (f.clone(), size))).collect();
-    let judge = |((name, exact), (n, slices, longest)): &((&str, Exact<f64>), (u32, u32, f64))| {
+    let compare = |((name, exact), (n, slices, longest)): &((&str, Exact<f64>), (u32, u32, f64))| {
         let (n, longest) = (*n, *longest);
         // Half of them within two texels of the diagonal, where functions are seen as they are.
         let near = |i: usize, f: f64, b: f64| {
             if i.is_multiple_of(2) { b } else { (f + 4.0 * b / f64::from(n)).clamp(-1.0, 1.0) }
         };
-        let judged = |(i, [f, b, l]): (usize, [f64; 3])| {
+        let compared = |(i, [f, b, l]): (usize, [f64; 3])| {
             let (b, l) = (near(i, f, b), longest * l);
             ([f, b, l], published(exact, f, b, l))
         };
-        let segments: Vec<_> = segments().enumerate().take(10_000).map(judged).collect();
+        let segments: Vec<_> = segments().enumerate().take(10_000).map(compared).collect();
         let mut wrong = vec![];
         let mut hold = |what: &str, bound: Option<f64>, look_up: &(dyn Fn(f64, f64, f64) -> [f64; 4] + Sync)| {
             let share =
-                Judged { exact, bound: bound.unwrap(), look_up }.share(&segments, 2.0 / f64::from(n - 1), longest);
+                Compared { exact, bound: bound.unwrap(), look_up }.share(&segments, 2.0 / f64::from(n - 1), longest);
             if !(0.05..=1.0).contains(&share) {
                 wrong.push(format!("{name}, direct {}, {what}, {n}, {longest}: {share:.3} of the bound", exact.direct));
             }
@@ -447,7 +447,7 @@ fn errors_are_within_their_bounds() {
         }
         wrong
     };
-    let wrong: Vec<String> = cases.par_iter().flat_map_iter(judge).collect();
+    let wrong: Vec<String> = cases.par_iter().flat_map_iter(compare).collect();
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 

@@ -65,19 +65,19 @@ pub(super) fn run(options: &Options, threads: usize) -> Result<()> {
     let given = options.request.scene()?;
     let size = options.request.studied(given.as_ref())?;
     let device = options.request.device(given.as_ref());
-    let mut judge = Renderer::with_device(threads, DeviceChoice::Cpu)?;
-    let job = judge.install(|| render::prepare(&options.request, given)?.of_mesh("study"))?;
+    let mut reference = Renderer::with_device(threads, DeviceChoice::Cpu)?;
+    let job = reference.install(|| render::prepare(&options.request, given)?.of_mesh("study"))?;
     let (view, _) = job.scene.view()?;
     let truth = progress::during("judging", |p| {
-        set(&mut judge, &job)?;
-        judge.render(&view, p)
+        set(&mut reference, &job)?;
+        reference.render(&view, p)
     })?;
     let project = Renderer::with_engine(threads, device, Engine::Project)?;
     // The walk on the device that projects, be it one in software.
     let same = DeviceChoice::Named(project.stats().adapter.clone());
     let walk = Renderer::with_device(threads, same)?;
     let mut rows = vec![];
-    for mut renderer in [judge, walk, project] {
+    for mut renderer in [reference, walk, project] {
         set(&mut renderer, &job)?;
         let Stats { engine, adapter, .. } = renderer.stats().clone();
         let name = format!("{engine} on {adapter}");
