@@ -5,8 +5,9 @@ use crate::error::{Error, Result};
 use crate::geometry::boundary::{BoundaryFace, LEAF};
 use crate::geometry::{Cell, TetMesh, Values};
 use crate::gpu::buffers::{Buffer, Chunks};
+use crate::gpu::clock::Clock;
 use crate::gpu::function;
-use crate::gpu::raster::Slot;
+use crate::gpu::raster::{Readback, Slot};
 use crate::gpu::rays::{self, FAR};
 use crate::gpu::shader::{self, Array, Variant};
 use crate::gpu::table::{self, TABLE};
@@ -18,7 +19,6 @@ use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use wgpu::{BufferUsages as Usage, ShaderStages as Stages};
 
 const TRAVERSE: &str = include_str!("../../shaders/traverse.wgsl");
@@ -299,14 +299,14 @@ impl Traverse {
         let ends = Buffer::holding(gpu, "ends", &ends, Usage::STORAGE)?;
         let pixels = Buffer::new(gpu, "pixels", size, Usage::STORAGE | Usage::COPY_SRC)?;
         let counts = Buffer::new(gpu, "counts", 16, Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST)?;
-        let back = Buffer::new(gpu, "readback", size + 32, Usage::COPY_DST | Usage::MAP_READ)?;
+        let back = Readback::new(gpu, size + 32)?;
         let [parameters, knots, buckets] = function;
         let own = [parameters, knots, buckets, &frame_buffer, &planes, &ends, &pixels, &counts];
         let own = raster::group_of(gpu, &self.layout, own);
         let shared = raster::group_of(gpu, group_layout, self.chunks()?.into_iter().flat_map(|c| &c.buffers));
         let tables = self.table.get().filter(|_| tabulated);
         let tables = tables.map(|t| raster::group(gpu, &self.tables, t.bindings()));
-        let clock = Clock::new(gpu)?;
+        let clock = Clock::of_one_pass(gpu)?;
 
         let mut drawn =
             Drawn { pixels: Vec::with_capacity(w as usize * h as usize), counts: Counts::default(), device_ms: None };
@@ -318,7 +318,7 @@ impl Traverse {
             {
                 let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
                     label: Some("traverse"),
-                    timestamp_writes: clock.as_ref().map(Clock::writes),
+                    timestamp_writes: clock.as_ref().and_then(|c| c.compute(0)),
                 });
                 pass.set_pipeline(pipeline);
                 pass.set_bind_group(0, &own, &[]);
@@ -328,22 +328,12 @@ impl Traverse {
                 }
                 pass.dispatch_workgroups(w.div_ceil(8), rows.div_ceil(8), 1);
             }
-            encoder.copy_buffer_to_buffer(&pixels.raw, 0, &back.raw, 0, size);
-            encoder.copy_buffer_to_buffer(&counts.raw, 0, &back.raw, size, 16);
+            encoder.copy_buffer_to_buffer(&pixels.raw, 0, back.raw(), 0, size);
+            encoder.copy_buffer_to_buffer(&counts.raw, 0, back.raw(), size, 16);
             if let Some(clock) = &clock {
-                clock.resolve(&mut encoder, &back, size + 16);
+                clock.resolve_one_pass(&mut encoder, back.raw(), size + 16);
             }
-            let mapped = Arc::new(AtomicBool::new(false));
-            let done = Arc::clone(&mapped);
-            encoder.map_buffer_on_submit(&back.raw, wgpu::MapMode::Read, .., move |r| done.store(r.is_ok(), Relaxed));
-            gpu.queue.submit([encoder.finish()]);
-            gpu.wait()?;
-            if !mapped.load(Relaxed) {
-                return Err(Error::Lost(format!("{} does not hand its pixels back", gpu.adapter.name)));
-            }
-            {
-                let failed = |e| Error::Lost(format!("{} does not hand its pixels back: {e}", gpu.adapter.name));
-                let bytes = back.raw.get_mapped_range(..).map_err(failed)?;
+            back.submit(gpu, encoder, |bytes| {
                 let (image, rest) = bytes.split_at(size as usize);
                 drawn.pixels.extend_from_slice(&bytemuck::cast_slice(image)[..w as usize * rows as usize]);
                 let c: RawCounts = bytemuck::pod_read_unaligned(&rest[..16]);
@@ -354,40 +344,9 @@ impl Traverse {
                     let ms = end.saturating_sub(start) as f64 * f64::from(gpu.queue.get_timestamp_period()) / 1e6;
                     drawn.device_ms = Some(drawn.device_ms.unwrap_or(0.0) + ms);
                 }
-            }
-            back.raw.unmap();
+            })?;
         }
         Ok(drawn)
-    }
-}
-
-/// Measures a pass, where the device can.
-struct Clock {
-    queries: wgpu::QuerySet,
-    resolved: Buffer,
-}
-
-impl Clock {
-    fn new(gpu: &Gpu) -> Result<Option<Self>> {
-        if !gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
-            return Ok(None);
-        }
-        let descriptor = wgpu::QuerySetDescriptor { label: None, ty: wgpu::QueryType::Timestamp, count: 2 };
-        let queries = gpu.device.create_query_set(&descriptor);
-        Ok(Some(Clock { queries, resolved: Buffer::new(gpu, "clock", 16, Usage::QUERY_RESOLVE | Usage::COPY_SRC)? }))
-    }
-
-    fn writes(&self) -> wgpu::ComputePassTimestampWrites<'_> {
-        wgpu::ComputePassTimestampWrites {
-            query_set: &self.queries,
-            beginning_of_pass_write_index: Some(0),
-            end_of_pass_write_index: Some(1),
-        }
-    }
-
-    fn resolve(&self, encoder: &mut wgpu::CommandEncoder, into: &Buffer, offset: u64) {
-        encoder.resolve_query_set(&self.queries, 0..2, &self.resolved.raw, 0);
-        encoder.copy_buffer_to_buffer(&self.resolved.raw, 0, &into.raw, offset, 16);
     }
 }
 
