@@ -173,12 +173,12 @@ pub(crate) struct Gpu {
     pub(crate) binding: u64,
     allocated: Arc<AtomicU64>,
     uploaded: AtomicU64,
-    fault: Arc<Mutex<Option<Fault>>>,
+    fault: Arc<Mutex<Option<DeviceFault>>>,
 }
 
 /// What went wrong first.
 #[derive(Debug, Clone)]
-enum Fault {
+enum DeviceFault {
     Lost(String),
     OutOfMemory,
     Refused(String),
@@ -232,12 +232,12 @@ impl Gpu {
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
             .map_err(|e| Error::Device(format!("{} cannot be opened: {e}", description.name)))?;
         let fault = Arc::new(Mutex::new(None));
-        let keep = |fault: &Arc<Mutex<Option<Fault>>>| {
+        let keep = |fault: &Arc<Mutex<Option<DeviceFault>>>| {
             let fault = Arc::clone(fault);
-            move |new: Fault| {
+            move |new: DeviceFault| {
                 let mut fault = fault.lock().unwrap_or_else(PoisonError::into_inner);
                 // A loss explains everything else.
-                if fault.is_none() || matches!(new, Fault::Lost(_)) {
+                if fault.is_none() || matches!(new, DeviceFault::Lost(_)) {
                     *fault = Some(new);
                 }
             }
@@ -245,13 +245,14 @@ impl Gpu {
         let (kept, lost) = (keep(&fault), keep(&fault));
         device.on_uncaptured_error(Arc::new(move |error| {
             kept(match error {
-                wgpu::Error::OutOfMemory { .. } => Fault::OutOfMemory,
+                wgpu::Error::OutOfMemory { .. } => DeviceFault::OutOfMemory,
                 wgpu::Error::Validation { description, .. } | wgpu::Error::Internal { description, .. } => {
-                    Fault::Refused(description)
+                    DeviceFault::Refused(description)
                 }
             });
         }));
-        device.set_device_lost_callback(move |reason, message| lost(Fault::Lost(format!("{reason:?}: {message}"))));
+        device
+            .set_device_lost_callback(move |reason, message| lost(DeviceFault::Lost(format!("{reason:?}: {message}"))));
         // Half of the main memory for a device that is the CPU; real ones tell when they have no more.
         let budget = if description.is_software() { main_memory() / 2 } else { u64::MAX };
         let limits = device.limits();
@@ -281,8 +282,8 @@ impl Gpu {
         let name = &self.adapter.name;
         match fault.clone() {
             None => Ok(()),
-            Some(Fault::Lost(why)) => Err(Error::Lost(format!("{name} was lost ({why})"))),
-            Some(Fault::OutOfMemory) => {
+            Some(DeviceFault::Lost(why)) => Err(Error::Lost(format!("{name} was lost ({why})"))),
+            Some(DeviceFault::OutOfMemory) => {
                 *fault = None;
                 let bytes = self.allocated();
                 Err(Error::Device(format!(
@@ -290,7 +291,7 @@ impl Gpu {
                      picture, another device, or \"cpu\", may do"
                 )))
             }
-            Some(Fault::Refused(what)) => {
+            Some(DeviceFault::Refused(what)) => {
                 *fault = None;
                 Err(Error::Device(format!("{name} refused a call: {what}")))
             }

@@ -141,7 +141,7 @@ pub enum Compositing {
 
 /// What a frame took.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Counts {
+pub(crate) struct ProjectionCounts {
     /// Cells that were drawn.
     pub(crate) cells: u64,
     /// What they were ordered by.

@@ -31,7 +31,7 @@ use crate::project::ProjectionOptions;
 use crate::transfer::TransferFunction;
 use crate::view::{Blend, View};
 pub use answer::Answer;
-use backend::{Backend, Drawn};
+use backend::{Backend, DrawnFrame};
 use frame::Frame;
 use glam::DVec3;
 use grid::LoadedGrid;
@@ -44,7 +44,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::Instant;
-use tables::{Key, Tables};
+use tables::{TableKey, Tables};
 
 /// The most threads of a renderer: more take minutes to start, and gain nothing.
 pub const MOST_THREADS: usize = 4096;
@@ -72,7 +72,7 @@ pub struct Renderer {
     integral: IntegrationOptions,
     tables: Tables,
     /// What of a table is needed, once that is known: none for the exact integral.
-    key: Option<Option<Arc<Key>>>,
+    key: Option<Option<Arc<TableKey>>>,
     /// Whether the next frame waits for its table.
     waits: bool,
     /// The device failed to build a table: others are built on the host.
@@ -427,7 +427,7 @@ impl Renderer {
                     let exact = Exact::new(transfer, kind, normal, geometry.scale);
                     // Devices build colours, and no weights of such.
                     let on_device = on_device && kind == Kind::Scalar;
-                    Arc::new(Key { exact, choice, longest, on_device })
+                    Arc::new(TableKey { exact, choice, longest, on_device })
                 });
                 self.key.insert(key)
             }
@@ -473,7 +473,7 @@ impl Renderer {
             self.stats.uploaded_bytes = gpu.uploaded() - uploaded;
             self.stats.device_bytes = gpu.allocated();
         }
-        let Drawn { pixels, counts, device_ms, projection, sweep } = drawn;
+        let DrawnFrame { pixels, counts, device_ms, projection, sweep } = drawn;
         self.stats.device_ms = device_ms;
         self.stats.steps = counts.steps;
         self.stats.retraced_rays = counts.retraced;

@@ -61,12 +61,12 @@ impl Normalization {
 
 /// What the values of one component must be told apart by.
 #[derive(Debug, Clone, Default)]
-struct Needs {
+struct Resolution {
     /// Places from and to which values may be off by some share of a distance, and this distance.
     needs: Vec<[f64; 3]>,
 }
 
-impl Needs {
+impl Resolution {
     /// Those of functions with knots at these places, ascending, and steps at those that come twice, of a component with
     /// values in `range`, of which `sample` are some. Unless the functions `clamp`, they step at their ends, too.
     fn new(functions: &[Vec<f64>], clamp: bool, [lo, hi]: [f64; 2], sample: &[f64]) -> Self {
@@ -83,7 +83,7 @@ impl Needs {
                 }
             }
         }
-        Needs { needs }
+        Resolution { needs }
     }
 
     /// How far values may be off at most, of the distances that they must be told apart by, if `mid` becomes 0.
@@ -183,7 +183,7 @@ impl Chooser {
         };
         let mut changed = false;
         for (k, functions) in functions {
-            let needs = Needs::new(&functions, transfer.clamp(), self.range[k], &self.samples[k]);
+            let needs = Resolution::new(&functions, transfer.clamp(), self.range[k], &self.samples[k]);
             let (now, fits) = (needs.blur(self.normal[k].mid), needs.fit(self.normal[k]));
             if fits && now <= SHARP {
                 continue;
@@ -231,8 +231,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn needs(places: &[f64]) -> Needs {
-        Needs::new(&[places.to_vec()], true, [-1e30, 1e30], &[0.0, 0.25, 0.5, 0.75, 1.0])
+    fn needs(places: &[f64]) -> Resolution {
+        Resolution::new(&[places.to_vec()], true, [-1e30, 1e30], &[0.0, 0.25, 0.5, 0.75, 1.0])
     }
 
     #[test]

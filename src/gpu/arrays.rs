@@ -1,7 +1,7 @@
 //! The mesh's arrays as shaders of all engines read them.
 
 use super::buffers::Chunks;
-use super::shader::Array;
+use super::shader::ShaderArray;
 use super::{Gpu, rays};
 use crate::error::Result;
 use crate::geometry::{TetMesh, Values};
@@ -41,10 +41,13 @@ pub(crate) fn values<const N: usize>(gpu: &Gpu, values: &Values<N>) -> Result<Ch
 }
 
 /// `chunks` as shaders see them, by the names of the arrays and of their elements.
-pub(crate) fn named<const N: usize>(names: [(&'static str, &'static str); N], chunks: [&Chunks; N]) -> [Array; N] {
+pub(crate) fn named<const N: usize>(
+    names: [(&'static str, &'static str); N],
+    chunks: [&Chunks; N],
+) -> [ShaderArray; N] {
     std::array::from_fn(|i| {
         let (name, element) = names[i];
-        Array { name, element, chunks: chunks[i].buffers.len(), shift: chunks[i].shift }
+        ShaderArray { name, element, chunks: chunks[i].buffers.len(), shift: chunks[i].shift }
     })
 }
 

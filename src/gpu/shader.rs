@@ -9,7 +9,7 @@ pub(crate) const INTEGRAL: &str = include_str!("../../shaders/integral.wgsl");
 
 /// What a program is compiled for.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Variant {
+pub(crate) struct ShaderVariant {
     /// The field's values.
     pub(crate) kind: Kind,
     /// Emission is not multiplied by extinction.
@@ -18,7 +18,7 @@ pub(crate) struct Variant {
 
 /// An array of the mesh's size, as a shader sees it: `name(i)` is its element i.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Array {
+pub(crate) struct ShaderArray {
     pub(crate) name: &'static str,
     pub(crate) element: &'static str,
     /// Number of bindings that it is spread over, and the logarithm of the elements in each.
@@ -27,7 +27,7 @@ pub(crate) struct Array {
 }
 
 /// Constants of the integral, and what differs between the kinds of fields.
-pub(crate) fn prelude(variant: &Variant) -> String {
+pub(crate) fn prelude(variant: &ShaderVariant) -> String {
     let mut text = String::new();
     let number = |x: f64| format!("{x:?}f");
     let mut constant = |name: &str, value: String| text += &format!("const {name} = {value};\n");
@@ -61,9 +61,9 @@ pub(crate) fn prelude(variant: &Variant) -> String {
 }
 
 /// Bindings of `arrays` in group 1, and the functions that look elements up in them.
-pub(crate) fn accessors(arrays: &[Array]) -> String {
+pub(crate) fn accessors(arrays: &[ShaderArray]) -> String {
     let (mut text, mut binding) = (String::new(), 0);
-    for Array { name, element, chunks, shift } in arrays {
+    for ShaderArray { name, element, chunks, shift } in arrays {
         for c in 0..*chunks {
             let place = format!("@group(1) @binding({binding})");
             text += &format!("{place} var<storage, read> {name}_{c}: array<{element}>;\n");

@@ -17,10 +17,10 @@ const PASSES: u32 = 8;
 
 const MOST_GROUPS: u32 = 65_535;
 
-/// `Pass` in the shader.
+/// `SortPass` in the shader.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
-struct Pass {
+struct SortPass {
     items: u32,
     shift: u32,
     blocks: u32,
@@ -72,7 +72,7 @@ impl Sorter {
         // An even number of passes: what the first writes to is the other pair, the last writes the order.
         let passes = (0..PASSES)
             .map(|p| {
-                let pass = Pass { items: items as u32, shift: 4 * p, blocks, is_first: u32::from(p == 0), row };
+                let pass = SortPass { items: items as u32, shift: 4 * p, blocks, is_first: u32::from(p == 0), row };
                 Buffer::holding(gpu, "pass", &[pass], Usage::UNIFORM)
             })
             .collect::<Result<Vec<_>>>()?;

@@ -2,7 +2,7 @@
 
 use super::Gpu;
 use super::buffers::Buffer;
-use super::construct::{Builder, Texels as BuiltTexels};
+use super::construct::{TableBuilder, Texels as BuiltTexels};
 use super::raster::{Slot, Texture};
 use crate::error::{Error, Result};
 use crate::integral::lookup::{Range, TableData};
@@ -94,7 +94,7 @@ pub(crate) struct OnDevice {
 #[derive(Debug, Default)]
 pub(crate) struct TableCache {
     table: Option<(Option<Arc<PreintegratedTable>>, OnDevice)>,
-    builder: Option<Builder>,
+    builder: Option<TableBuilder>,
 }
 
 impl TableCache {
@@ -123,7 +123,7 @@ impl TableCache {
                 Some((table, Some(exact))) => {
                     let builder = match self.builder.take().filter(|b| b.suits(exact)) {
                         Some(builder) => builder,
-                        None => Builder::new(gpu, exact.direct)?,
+                        None => TableBuilder::new(gpu, exact.direct)?,
                     };
                     OnDevice::building(gpu, table, exact, self.builder.insert(builder), function)?
                 }
@@ -221,7 +221,7 @@ impl OnDevice {
         gpu: &Gpu,
         table: &PreintegratedTable,
         exact: &Exact<f64>,
-        builder: &Builder,
+        builder: &TableBuilder,
         function: &[Buffer; 3],
     ) -> Result<Self> {
         let on_device = Self::empty(gpu, table, texel_format(gpu, Texels::Float)?)?;

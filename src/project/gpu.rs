@@ -12,13 +12,13 @@ mod ordering;
 mod primitive;
 mod program;
 
-use super::{Counts, Fragments, Order, ProjectionOptions, Target};
+use super::{Fragments, Order, ProjectionCounts, ProjectionOptions, Target};
 use crate::error::{Error, Result};
 use crate::field::Kind;
 use crate::geometry::{TetMesh, Values};
 use crate::gpu::buffers::{Buffer, Chunks};
 use crate::gpu::raster::{self, Slot, Texture};
-use crate::gpu::shader::{Array, Variant};
+use crate::gpu::shader::{ShaderArray, ShaderVariant};
 use crate::gpu::sort::Sorter;
 use crate::gpu::{DeviceChoice, Gpu, Part, arrays, function, table};
 use crate::integral::{Exact, PreintegratedTable};
@@ -29,7 +29,7 @@ use drawing::Canvas;
 use frame::SeenView;
 use ordering::{Ordered, Sequenced, Sequencing};
 use primitive::Layout;
-use program::{Drawn, Program, program};
+use program::{DrawSettings, Program, program};
 use std::sync::Arc;
 use std::time::Instant;
 use wgpu::{BufferUsages as Usage, ShaderStages as Stages};
@@ -221,7 +221,7 @@ impl Project {
         table: Option<&Arc<PreintegratedTable>>,
         view: &View,
         options: &ProjectionOptions,
-    ) -> Result<(Vec<[f32; 4]>, Counts)> {
+    ) -> Result<(Vec<[f32; 4]>, ProjectionCounts)> {
         let is_maximum = view.blend() == Blend::Maximum;
         // Nothing is blended, and no segment integrated.
         let format = if is_maximum { wgpu::TextureFormat::Rgba32Float } else { self.format(options.target)? };
@@ -234,12 +234,12 @@ impl Project {
         let is_rare = options.fragments == Fragments::Intersected && (options.dithers() || seen.limits().any());
         let has_line = table.is_none() && !is_maximum && exact.kind != Kind::Pair;
         let layout = Layout::new(options.fragments, exact.kind.components(), has_line, is_rare);
-        let variant = Variant { kind: exact.kind, direct: exact.direct };
+        let variant = ShaderVariant { kind: exact.kind, direct: exact.direct };
         let mut limits = seen.limits();
         // In parallel views all segments of a cell are on one plane.
         let one_plane = table.is_some_and(|t| t.options().per_cell) || view.eye().is_none();
         limits.plane_per_cell = one_plane && options.fragments != Fragments::Intersected;
-        let drawn = Drawn { options, blend: view.blend() };
+        let drawn = DrawSettings { options, blend: view.blend() };
         let source = program(&variant, association, drawn, &layout, table.map(|t| &**t), limits, &arrays);
         self.prepare_canvas(&layout, view.size(), format, is_maximum)?;
         self.compile(&arrays, source, drawn, layout, format)?;
@@ -251,7 +251,7 @@ impl Project {
             order if geometry.is_connected() || order.rule().is_none() => order,
             _ => Order::Depth,
         };
-        let mut counts = Counts { order: by, ..Counts::default() };
+        let mut counts = ProjectionCounts { order: by, ..ProjectionCounts::default() };
         let splits = options.fragments != Fragments::Intersected && view.eye().is_some();
         let asked = Sequencing { by, splits, all: is_maximum };
         if !self.ordered.as_ref().is_some_and(|o| o.holds_for(&seen, asked)) {
@@ -294,7 +294,7 @@ impl Project {
     }
 
     /// The arrays of group 1 of the compute stages, in the order of [`Self::chunks`].
-    fn arrays(&self) -> Result<[Array; 3]> {
+    fn arrays(&self) -> Result<[ShaderArray; 3]> {
         Ok(arrays::named(ARRAYS, self.chunks()?))
     }
 

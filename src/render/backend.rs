@@ -51,7 +51,7 @@ impl Needs {
 
 /// A frame, and what it took.
 #[derive(Debug, Default)]
-pub(super) struct Drawn {
+pub(super) struct DrawnFrame {
     pub(super) pixels: Vec<[f32; 4]>,
     /// What walks did.
     pub(super) counts: cpu::Counts,
@@ -190,7 +190,7 @@ impl Backend {
     }
 
     /// Draws a frame on the current rayon pool.
-    pub(super) fn draw<const N: usize>(&mut self, frame: &Frame, values: &Values<N>) -> Result<Drawn> {
+    pub(super) fn draw<const N: usize>(&mut self, frame: &Frame, values: &Values<N>) -> Result<DrawnFrame> {
         match self {
             Backend::Walk => Ok(walk(frame, values)),
             Backend::WalkOnDevice(traverse) => walk_on(traverse, frame, values),
@@ -205,14 +205,14 @@ fn integral<'a>(frame: &Frame<'a>) -> Integral<'a> {
     Integral { exact: frame.exact, table: frame.table.map(|t| &**t).filter(|t| t.source().is_none()) }
 }
 
-fn walk<const N: usize>(frame: &Frame, values: &Values<N>) -> Drawn {
+fn walk<const N: usize>(frame: &Frame, values: &Values<N>) -> DrawnFrame {
     let pixel = |v: &[f32; N]| frame.largest(v);
     let geometry = &frame.mesh.geometry;
     let (image, counts) = cpu::render(geometry, values, integral(frame), &pixel, frame.view, frame.progress);
-    Drawn { pixels: image.pixels, counts, ..Drawn::default() }
+    DrawnFrame { pixels: image.pixels, counts, ..DrawnFrame::default() }
 }
 
-fn walk_on<const N: usize>(traverse: &mut Traverse, frame: &Frame, values: &Values<N>) -> Result<Drawn> {
+fn walk_on<const N: usize>(traverse: &mut Traverse, frame: &Frame, values: &Values<N>) -> Result<DrawnFrame> {
     let geometry = &frame.mesh.geometry;
     let pixel = |v: &[f32; N]| frame.largest(v);
     let mut drawn = traverse.render(geometry, values, frame.exact, frame.table, frame.view)?;
@@ -224,10 +224,10 @@ fn walk_on<const N: usize>(traverse: &mut Traverse, frame: &Frame, values: &Valu
     unfinished.iter().zip(by_cpu).for_each(|(&i, p)| drawn.pixels[i] = p);
     drawn.counts.unfinished = unfinished.len() as u64;
     let _ = (frame.progress)(1.0);
-    Ok(Drawn { pixels: drawn.pixels, counts: drawn.counts, device_ms: drawn.device_ms, ..Drawn::default() })
+    Ok(DrawnFrame { pixels: drawn.pixels, counts: drawn.counts, device_ms: drawn.device_ms, ..DrawnFrame::default() })
 }
 
-fn project_by<const N: usize>(sweep: &mut Sweep, frame: &Frame, values: &Values<N>) -> Result<Drawn> {
+fn project_by<const N: usize>(sweep: &mut Sweep, frame: &Frame, values: &Values<N>) -> Result<DrawnFrame> {
     if *frame.projection != ProjectionOptions::default() {
         return Err(Error::Device("the projection engine has variants on a graphics device only".into()));
     }
@@ -252,10 +252,10 @@ fn project_by<const N: usize>(sweep: &mut Sweep, frame: &Frame, values: &Values<
     };
     let mut walked = counts.walked;
     walked.steps += counts.fragments;
-    Ok(Drawn { pixels, counts: walked, sweep: Some(sweep), ..Drawn::default() })
+    Ok(DrawnFrame { pixels, counts: walked, sweep: Some(sweep), ..DrawnFrame::default() })
 }
 
-fn project_on<const N: usize>(project: &mut Project, frame: &Frame, values: &Values<N>) -> Result<Drawn> {
+fn project_on<const N: usize>(project: &mut Project, frame: &Frame, values: &Values<N>) -> Result<DrawnFrame> {
     let Frame { mesh, exact, table, view, projection, .. } = frame;
     let (mut pixels, counts) = project.render(&mesh.geometry, values, exact, *table, view, projection)?;
     let mut walked = vec![];
@@ -269,7 +269,7 @@ fn project_on<const N: usize>(project: &mut Project, frame: &Frame, values: &Val
         walked.iter().zip(by_cpu).for_each(|(&i, p)| pixels[i] = p);
     }
     let _ = (frame.progress)(1.0);
-    let project::Counts { project_ms, draw_ms, .. } = counts;
+    let project::ProjectionCounts { project_ms, draw_ms, .. } = counts;
     let stats = ProjectionStats {
         drawn_cells: counts.cells,
         order: counts.order,
@@ -285,5 +285,5 @@ fn project_on<const N: usize>(project: &mut Project, frame: &Frame, values: &Val
         fragments: counts.fragments,
     };
     let device_ms = project_ms.zip(draw_ms).map(|(p, d)| p + d);
-    Ok(Drawn { pixels, device_ms, projection: Some(stats), ..Drawn::default() })
+    Ok(DrawnFrame { pixels, device_ms, projection: Some(stats), ..DrawnFrame::default() })
 }

@@ -3,7 +3,7 @@
 mod second;
 
 use super::largest::Largest;
-use super::tables::Key;
+use super::tables::TableKey;
 use super::{Progress, Renderer, ms};
 use crate::cast::tabulated::{self, Tabulated};
 use crate::cast::{self, Order, Reconstruction, Samples, Sampling, Volume};
@@ -63,7 +63,7 @@ impl OnGrid {
         transfer: &TransferFunction,
         how: Reconstruction,
         volume: &Volume,
-    ) -> Result<Option<Key>> {
+    ) -> Result<Option<TableKey>> {
         if matches!(choice.form, Form::Auto | Form::Exact) {
             return Ok(None);
         }
@@ -81,7 +81,7 @@ impl OnGrid {
             Sampling::Steps(step) => 2.0 * step,
         };
         let longest = volume.scale * if how.order == Order::One { slab / 2.0 } else { slab };
-        Ok(Some(Key { exact: own, choice: *choice, longest, on_device: false }))
+        Ok(Some(TableKey { exact: own, choice: *choice, longest, on_device: false }))
     }
 
     fn largest<'a>(&'a self, transfer: &'a TransferFunction, as_values: bool) -> Largest<'a> {

@@ -1,7 +1,7 @@
 //! Frames whose transfer function has a second variable, or light: what they need besides the field, kept as long as it
 //! holds. The walk on the CPU draws them.
 
-use super::{Drawn, Loaded, Progress, Renderer, Stats, missing, ms};
+use super::{DrawnFrame, Loaded, Progress, Renderer, Stats, missing, ms};
 use crate::error::{Error, Result};
 use crate::field::gradient::length;
 use crate::field::normalization::MOST;
@@ -72,7 +72,7 @@ impl Renderer {
             let culled = seen.map_or((0, 0.0), |s| (s.culled, s.ms));
             Ok::<_, Error>((draw(mesh, values, second, seen, view, progress), culled))
         });
-        let (Drawn { pixels, counts, .. }, (culled_cells, culling_ms)) = drawn?;
+        let (DrawnFrame { pixels, counts, .. }, (culled_cells, culling_ms)) = drawn?;
         self.stats = Stats {
             integral: two.method.name().into(),
             table_ms: 0.0,
@@ -277,11 +277,11 @@ fn draw(
     seen: Option<&Seen>,
     view: &View,
     progress: &Progress,
-) -> Drawn {
+) -> DrawnFrame {
     let seen = seen.map(|s| &s.bits[..]);
     let (image, counts) = match values {
         TwoOrFive::Two(v) => render_two(&mesh.geometry, v, second, seen, view, progress),
         TwoOrFive::Five(v) => render_two(&mesh.geometry, v, second, seen, view, progress),
     };
-    Drawn { pixels: image.pixels, counts, ..Drawn::default() }
+    DrawnFrame { pixels: image.pixels, counts, ..DrawnFrame::default() }
 }

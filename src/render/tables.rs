@@ -17,7 +17,7 @@ const SAMPLES: usize = 1 << 16;
 
 /// All that a table depends on.
 #[derive(Debug, PartialEq)]
-pub(super) struct Key {
+pub(super) struct TableKey {
     pub(super) exact: Exact<f64>,
     pub(super) choice: IntegrationOptions,
     pub(super) longest: f64,
@@ -35,18 +35,18 @@ pub(super) struct Built {
 /// The table of the frames now, and the one that is being built.
 #[derive(Debug, Default)]
 pub(super) struct Tables {
-    ready: Option<(Arc<Key>, Built)>,
-    building: Option<(Arc<Key>, Receiver<Result<Built>>)>,
+    ready: Option<(Arc<TableKey>, Built)>,
+    building: Option<(Arc<TableKey>, Receiver<Result<Built>>)>,
     /// The last one, whose memory the next takes.
     spare: Option<Arc<PreintegratedTable>>,
     /// Not the renderer's: frames would wait behind the table's work.
     pool: Option<rayon::ThreadPool>,
 }
 
-impl Key {
+impl TableKey {
     fn build(&self, spare: Option<Arc<PreintegratedTable>>) -> Result<Built> {
         let start = Instant::now();
-        let Key { exact, choice, longest, .. } = self;
+        let TableKey { exact, choice, longest, .. } = self;
         let table = match spare.and_then(Arc::into_inner) {
             _ if self.on_device => PreintegratedTable::outline(exact, choice, *longest),
             Some(old) => PreintegratedTable::renewed(old, exact, choice, *longest),
@@ -62,7 +62,7 @@ impl Tables {
     ///
     /// # Errors
     /// Those of [`PreintegratedTable::new`].
-    pub(super) fn get(&mut self, key: &Arc<Key>, wait: bool, own: &rayon::ThreadPool) -> Result<Option<Built>> {
+    pub(super) fn get(&mut self, key: &Arc<TableKey>, wait: bool, own: &rayon::ThreadPool) -> Result<Option<Built>> {
         self.collect(key, wait)?;
         if let Some((ready, built)) = &self.ready
             && ready == key
@@ -86,7 +86,7 @@ impl Tables {
     ///
     /// # Errors
     /// [`Error::Render`] if no thread can be started.
-    pub(super) fn start(&mut self, key: &Arc<Key>, own: &rayon::ThreadPool) -> Result<()> {
+    pub(super) fn start(&mut self, key: &Arc<TableKey>, own: &rayon::ThreadPool) -> Result<()> {
         // One at a time: what is asked for last comes next.
         if self.building.is_some() || self.ready.as_ref().is_some_and(|r| r.0 == *key) {
             return Ok(());
@@ -106,19 +106,19 @@ impl Tables {
     }
 
     /// The table of `key`, if it is there.
-    pub(super) fn ready(&self, key: &Arc<Key>) -> Option<&Built> {
+    pub(super) fn ready(&self, key: &Arc<TableKey>) -> Option<&Built> {
         self.ready.as_ref().filter(|r| r.0 == *key).map(|r| &r.1)
     }
 
     /// Notes what building the table of `key` took.
-    pub(super) fn took(&mut self, key: &Arc<Key>, ms: f64) {
+    pub(super) fn took(&mut self, key: &Arc<TableKey>, ms: f64) {
         if let Some((_, built)) = self.ready.as_mut().filter(|r| r.0 == *key) {
             built.ms += ms;
         }
     }
 
     /// Takes what has been built, waiting for it if it is `key`'s.
-    fn collect(&mut self, key: &Arc<Key>, wait: bool) -> Result<()> {
+    fn collect(&mut self, key: &Arc<TableKey>, wait: bool) -> Result<()> {
         let Some((building, receiver)) = self.building.take() else { return Ok(()) };
         let same = building == *key;
         let got =
@@ -148,7 +148,7 @@ impl Tables {
 
 impl Renderer {
     /// Has the table built that a frame was drawn without.
-    pub(super) fn build_next(&mut self, late: Option<Arc<Key>>) -> Result<()> {
+    pub(super) fn build_next(&mut self, late: Option<Arc<TableKey>>) -> Result<()> {
         let Some(key) = late else { return Ok(()) };
         self.tables.start(&key, &self.pool)?;
         if let (true, Some(built), Some(exact)) = (key.on_device, self.tables.ready(&key), &self.exact) {

@@ -4,7 +4,7 @@
 
 mod segments;
 
-use crate::cell::{Face, Frame};
+use crate::cell::{Face, RayFrame};
 use crate::geometry::boundary::{Beam, Candidate};
 use crate::geometry::{TetMesh, Values};
 use crate::image::Image;
@@ -274,7 +274,7 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
         // From the point of the ray that is nearest to the middle of the mesh, so that no distance is great.
         let start = -origin.dot(ray.direction);
         let (t_min, t_max) = (ray.t_min * scale - start, ray.t_max * scale - start);
-        let straight = Frame::new(origin + ray.direction * start, ray.direction);
+        let straight = RayFrame::new(origin + ray.direction * start, ray.direction);
         let none = || Gathered { light: Light::none(), largest: None };
         if t_min.max(-4.0) >= t_max.min(4.0) {
             return none();
@@ -296,7 +296,7 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
     #[inline(always)]
     fn walk(
         &mut self,
-        frame: &Frame,
+        frame: &RayFrame,
         pixel: DVec2,
         [t_min, t_max]: [f64; 2],
         accept_grazing: bool,
@@ -322,7 +322,7 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
 
     /// Collects where the ray enters the mesh, in order; false if any of it is too close to an edge.
     #[inline(always)]
-    fn find_entries(&mut self, frame: &Frame, pixel: DVec2) -> bool {
+    fn find_entries(&mut self, frame: &RayFrame, pixel: DVec2) -> bool {
         let TetMesh { points, boundary, .. } = self.geometry;
         let mut clear = true;
         self.entries.clear();
@@ -346,7 +346,7 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
     #[inline(always)]
     fn follow(
         &mut self,
-        frame: &Frame,
+        frame: &RayFrame,
         e: usize,
         [t_min, t_max]: [f64; 2],
         gathered: &mut Gathered<S::Value, N>,

@@ -9,7 +9,7 @@ use crate::gpu::clock::Clock;
 use crate::gpu::function;
 use crate::gpu::raster::{Readback, Slot};
 use crate::gpu::rays::{self, FAR};
-use crate::gpu::shader::{self, Array, Variant};
+use crate::gpu::shader::{self, ShaderArray, ShaderVariant};
 use crate::gpu::table::{self, TABLE};
 use crate::gpu::{Gpu, Part, arrays, raster};
 use crate::integral::{Exact, PreintegratedTable};
@@ -113,7 +113,7 @@ struct RawCounts {
 }
 
 /// A frame as the device drew it.
-pub(crate) struct Drawn {
+pub(crate) struct WalkedFrame {
     /// Premultiplied colours; for [`Blend::Maximum`] the largest values instead.
     pub(crate) pixels: Vec<[f32; 4]>,
     pub(crate) counts: Counts,
@@ -220,12 +220,12 @@ impl Traverse {
         exact: &Exact<f32>,
         table: Option<&Arc<PreintegratedTable>>,
         view: &View,
-    ) -> Result<Drawn> {
+    ) -> Result<WalkedFrame> {
         self.upload(geometry, values, exact)?;
         self.prepare_table(exact, table)?;
         let association = arrays::association(values);
         let arrays = self.arrays()?;
-        let variant = Variant { kind: exact.kind, direct: exact.direct };
+        let variant = ShaderVariant { kind: exact.kind, direct: exact.direct };
         let source = program(&variant, association, view.blend(), table.map(|t| &**t), &arrays);
         if self.program.as_ref().is_none_or(|p| p.0 != source) {
             let bindings = arrays.iter().map(|a| a.chunks).sum();
@@ -254,7 +254,7 @@ impl Traverse {
     }
 
     /// The arrays of group 1, in the order of [`Self::chunks`].
-    fn arrays(&self) -> Result<[Array; 6]> {
+    fn arrays(&self) -> Result<[ShaderArray; 6]> {
         Ok(arrays::named(ARRAYS, self.chunks()?))
     }
 
@@ -267,7 +267,7 @@ impl Traverse {
         }
     }
 
-    fn draw(&self, geometry: &TetMesh, tabulated: bool, view: &View) -> Result<Drawn> {
+    fn draw(&self, geometry: &TetMesh, tabulated: bool, view: &View) -> Result<WalkedFrame> {
         let gpu = &self.gpu;
         let (Some(function), Some((_, pipeline, group_layout))) = (&self.function, &self.program) else {
             return Err(Error::Render("the device does not hold the transfer function".into()));
@@ -308,8 +308,11 @@ impl Traverse {
         let tables = tables.map(|t| raster::group(gpu, &self.tables, t.bindings()));
         let clock = Clock::of_one_pass(gpu)?;
 
-        let mut drawn =
-            Drawn { pixels: Vec::with_capacity(w as usize * h as usize), counts: Counts::default(), device_ms: None };
+        let mut drawn = WalkedFrame {
+            pixels: Vec::with_capacity(w as usize * h as usize),
+            counts: Counts::default(),
+            device_ms: None,
+        };
         for first_row in (0..h).step_by(rows as usize) {
             let rows = rows.min(h - first_row);
             frame_buffer.write(gpu, 0, bytemuck::bytes_of(&RayUniforms { first_row, rows, ..frame }));
@@ -352,11 +355,11 @@ impl Traverse {
 
 /// The whole program.
 fn program(
-    variant: &Variant,
+    variant: &ShaderVariant,
     association: &str,
     blend: Blend,
     table: Option<&PreintegratedTable>,
-    arrays: &[Array],
+    arrays: &[ShaderArray],
 ) -> String {
     let mut text = shader::prelude(variant);
     for (name, value) in [

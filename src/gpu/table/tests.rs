@@ -3,7 +3,7 @@
 use super::*;
 use crate::field;
 use crate::gpu::raster::{self, Readback};
-use crate::gpu::shader::{self, Variant};
+use crate::gpu::shader::{self, ShaderVariant};
 use crate::gpu::testing::{gpu, validated};
 use crate::integral::lookup::tests::{choices, exact, segments, transfer, worst};
 use crate::integral::options::{Form, IntegrationOptions};
@@ -22,7 +22,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 }";
 
 fn source(table: &PreintegratedTable, direct: bool) -> String {
-    let variant = Variant { kind: field::Kind::Scalar, direct };
+    let variant = ShaderVariant { kind: field::Kind::Scalar, direct };
     let constants = constants(Some(table), false) + &declarations(2, 0);
     [&shader::prelude(&variant), &constants, shader::INTEGRAL, TABLE, MAIN].join("\n")
 }
@@ -117,7 +117,7 @@ fn devices_look_up_what_they_built() {
             1.0,
         );
         let function = crate::gpu::function::upload(&gpu, &narrow).unwrap();
-        let builder = Builder::new(&gpu, direct).unwrap();
+        let builder = TableBuilder::new(&gpu, direct).unwrap();
         let volumes = [Kind::Uniform, Kind::Log, Kind::LogNormalised].map(|lengths| IntegrationOptions {
             lengths,
             table: Some([17, 17, 8]),

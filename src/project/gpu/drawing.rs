@@ -7,7 +7,7 @@ use crate::gpu::buffers::Buffer;
 use crate::gpu::clock::{CLOCKS, Clock};
 use crate::gpu::raster::{self, Readback, Texture};
 use crate::gpu::rays::FAR;
-use crate::project::Counts;
+use crate::project::ProjectionCounts;
 use crate::view::View;
 use wgpu::{BufferUsages as Usage, TextureUsages};
 
@@ -70,7 +70,7 @@ impl Project {
     }
 
     /// Projects and draws all batches.
-    pub(super) fn draw(&self, frame: &Pass, view: &View, counts: &mut Counts) -> Result<Vec<[f32; 4]>> {
+    pub(super) fn draw(&self, frame: &Pass, view: &View, counts: &mut ProjectionCounts) -> Result<Vec<[f32; 4]>> {
         let gpu = &self.gpu;
         let (Some(program), Some(canvas), Some(ordered)) = (self.programs.first(), &self.canvas, &self.ordered) else {
             return Err(unprepared());

@@ -42,7 +42,7 @@ pub(super) fn image(gpu: &Gpu, exact: &Exact<f32>) -> Result<Texture> {
 /// What is known of an end of a bin.
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct End {
+pub(super) struct BinEnd {
     /// The number of bins below it in which something may be seen.
     pub(super) shown: u32,
     /// The line that it is on.
@@ -50,13 +50,13 @@ pub(super) struct End {
 }
 
 /// The [`BINS`] + 1 ends of bins.
-pub(super) fn bins(exact: &Exact<f32>) -> Vec<End> {
+pub(super) fn bins(exact: &Exact<f32>) -> Vec<BinEnd> {
     // Where emission is not bound to extinction, another component may shine.
     let shines = exact.direct && exact.kind != Kind::Scalar;
     let begins: Vec<f32> = exact.opacity.lines().iter().filter(|l| l.ends[0] < l.ends[1]).map(|l| l.ends[0]).collect();
     let at = |b: usize| (2.0 * b as f64 / BINS as f64 - 1.0) as f32;
     let shows = |knots: &Knots<f32>, b: usize| shines || knots.shows(at(b), at(b + 1), exact.direct);
-    let mut ends = vec![End::default(); BINS + 1];
+    let mut ends = vec![BinEnd::default(); BINS + 1];
     for b in 0..=BINS {
         ends[b].line = begins.partition_point(|&s| s <= at(b)).max(1) as u32 - 1;
         if b > 0 {

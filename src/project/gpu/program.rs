@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::gpu::arrays;
 use crate::gpu::raster::{self, Slot};
 use crate::gpu::rays::FAR;
-use crate::gpu::shader::{self, Array, Variant};
+use crate::gpu::shader::{self, ShaderArray, ShaderVariant};
 use crate::gpu::table::{self, TABLE};
 use crate::integral::PreintegratedTable;
 use crate::order::depth::HIDDEN;
@@ -50,7 +50,7 @@ fn fragment_of(front: Value, back: Value, length: f32, attributes: Attributes, a
 
 /// How a frame is drawn.
 #[derive(Clone, Copy)]
-pub(super) struct Drawn<'a> {
+pub(super) struct DrawSettings<'a> {
     pub(super) options: &'a ProjectionOptions,
     pub(super) blend: Blend,
 }
@@ -79,13 +79,13 @@ pub(super) struct Program {
 impl Project {
     pub(super) fn compile(
         &mut self,
-        arrays: &[Array],
+        arrays: &[ShaderArray],
         source: String,
-        drawn: Drawn,
+        drawn: DrawSettings,
         layout: Layout,
         format: wgpu::TextureFormat,
     ) -> Result<()> {
-        let Drawn { options, blend } = drawn;
+        let DrawSettings { options, blend } = drawn;
         let compositing = options.compositing;
         let same = |p: &Program| p.source == source && p.format == format && p.compositing == compositing;
         if let Some(known) = self.programs.iter().position(same) {
@@ -135,13 +135,13 @@ impl Project {
 
 /// The whole program.
 pub(super) fn program(
-    variant: &Variant,
+    variant: &ShaderVariant,
     association: &str,
-    Drawn { options, blend }: Drawn,
+    DrawSettings { options, blend }: DrawSettings,
     layout: &Layout,
     table: Option<&PreintegratedTable>,
     limits: Limits,
-    arrays: &[Array],
+    arrays: &[ShaderArray],
 ) -> String {
     let mut text = shader::prelude(variant);
     // Twice the area of the blocks that a line of unit length passes, by its mean direction.

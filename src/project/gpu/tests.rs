@@ -16,8 +16,8 @@ use crate::view::{Camera, ClippingPlane, Projection};
 use glam::{DVec3, dvec3};
 use wgpu::naga;
 
-fn arrays(chunks: usize) -> Vec<Array> {
-    ARRAYS.map(|(name, element)| Array { name, element, chunks, shift: 22 }).to_vec()
+fn arrays(chunks: usize) -> Vec<ShaderArray> {
+    ARRAYS.map(|(name, element)| ShaderArray { name, element, chunks, shift: 22 }).to_vec()
 }
 
 const KINDS: [Kind; 3] = [Kind::Scalar, Kind::Pair, Kind::Rgba];
@@ -47,12 +47,12 @@ fn every_program_is_valid() {
                         perspective: chunks < 3,
                         plane_per_cell: direct && fragments != Fragments::Intersected,
                     };
-                    let variant = Variant { kind, direct };
+                    let variant = ShaderVariant { kind, direct };
                     let arrays = arrays(chunks);
                     let layout =
                         Layout::new(fragments, kind.components(), has_line, fragments == Fragments::Intersected);
                     for blend in [Blend::Composite, Blend::Maximum] {
-                        let drawn = Drawn { options: &options, blend };
+                        let drawn = DrawSettings { options: &options, blend };
                         validated(&program(&variant, association, drawn, &layout, table.as_ref(), limits, &arrays));
                     }
                 }
@@ -73,9 +73,9 @@ fn layouts_match_their_rust_twins() {
             );
             let options = ProjectionOptions { fragments, ..ProjectionOptions::default() };
             let module = validated(&program(
-                &Variant { kind, direct: false },
+                &ShaderVariant { kind, direct: false },
                 "POINT",
-                Drawn { options: &options, blend: Blend::Composite },
+                DrawSettings { options: &options, blend: Blend::Composite },
                 &layout,
                 None,
                 Limits::default(),

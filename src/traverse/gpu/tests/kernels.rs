@@ -12,8 +12,8 @@ use wgpu::naga;
 
 const KINDS: [Kind; 3] = [Kind::Scalar, Kind::Pair, Kind::Rgba];
 
-fn arrays(chunks: usize) -> Vec<Array> {
-    ARRAYS.map(|(name, element)| Array { name, element, chunks, shift: 22 }).to_vec()
+fn arrays(chunks: usize) -> Vec<ShaderArray> {
+    ARRAYS.map(|(name, element)| ShaderArray { name, element, chunks, shift: 22 }).to_vec()
 }
 
 #[test]
@@ -22,7 +22,7 @@ fn every_program_is_valid() {
         for (direct, chunks) in [(false, 1), (true, 3)] {
             for association in ["POINT", "CORNER", "CELL"] {
                 for blend in [Blend::Composite, Blend::Maximum] {
-                    validated(&program(&Variant { kind, direct }, association, blend, None, &arrays(chunks)));
+                    validated(&program(&ShaderVariant { kind, direct }, association, blend, None, &arrays(chunks)));
                 }
             }
         }
@@ -32,7 +32,7 @@ fn every_program_is_valid() {
 #[test]
 fn layouts_match_their_rust_twins() {
     use std::mem::offset_of;
-    let variant = Variant { kind: Kind::Scalar, direct: false };
+    let variant = ShaderVariant { kind: Kind::Scalar, direct: false };
     let module = validated(&program(&variant, "POINT", Blend::Composite, None, &arrays(1)));
     let check = |name: &str, size: usize, offsets: &[usize]| {
         let (_, t) = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name)).unwrap();
@@ -138,7 +138,7 @@ fn cells_are_walked_as_in_f64() {
             points
         })
         .collect();
-    let variant = Variant { kind: Kind::Scalar, direct: false };
+    let variant = ShaderVariant { kind: Kind::Scalar, direct: false };
     let source = [&shader::prelude(&variant), shader::CELL, CELL_TEST].join("\n");
     let outcomes: Vec<Outcome> = run(&gpu, &source, &[], &cases);
     let mut entered = 0;
@@ -172,7 +172,7 @@ fn areas_are_as_accurate_as_they_are_small() {
             })
         })
         .collect();
-    let variant = Variant { kind: Kind::Scalar, direct: false };
+    let variant = ShaderVariant { kind: Kind::Scalar, direct: false };
     let source = [&shader::prelude(&variant), shader::CELL, CELL_TEST].join("\n");
     let outcomes: Vec<Outcome> = run(&gpu, &source, &[], &cases);
     for (case, outcome) in cases.iter().zip(&outcomes) {
@@ -225,7 +225,7 @@ fn places_beside_a_ray_are_as_accurate_as_they_are_near() {
                 .map(|v| double_single(v).map(|[x, y, z]| [x, y, z, 0.0]))
         })
         .collect();
-    let variant = Variant { kind: Kind::Scalar, direct: false };
+    let variant = ShaderVariant { kind: Kind::Scalar, direct: false };
     let source = [&shader::prelude(&variant), shader::CELL, PLACE_TEST].join("\n");
     let outcomes: Vec<PlaceOutcome> = run(&gpu, &source, &[], &cases);
     let whole = |[high, low]: [[f32; 4]; 2]| {
@@ -305,7 +305,7 @@ fn segments_are_integrated_as_in_f64() {
             Kind::Pair => "v.xy",
             Kind::Rgba => "v",
         };
-        let variant = Variant { kind, direct: fast.direct };
+        let variant = ShaderVariant { kind, direct: fast.direct };
         let convert = format!("fn value_of(v: vec4f) -> Value {{ return {value}; }}");
         let source = [&shader::prelude(&variant), &convert, shader::INTEGRAL, INTEGRAL_TEST].join("\n");
         let [function, knots, buckets] = function::upload(&gpu, &fast).unwrap();
