@@ -333,7 +333,7 @@ fn table(size: [i32; 3]) -> Result<Option<[u32; 3]>> {
         [Ok(front), Ok(back), Ok(depth)] => Ok(Some([front, back, depth])),
         _ => {
             let size = size.map(|n| n.to_string()).join(" x ");
-            Err(Error::Render(format!("a table of {size} texels cannot be; 0 x 0 x 0 is the default")))
+            Err(Error::Render(format!("there can be no table of {size} texels; 0 x 0 x 0 chooses the default size")))
         }
     }
 }
@@ -417,7 +417,11 @@ fn render(session: &mut Session, spec: ViewSpec, pixels: &mut [f32], progress: &
         let view = view(&spec)?;
         let (w, h) = (spec.width as usize, spec.height as usize);
         if pixels.len() != 4 * w * h {
-            return Err(Error::View(format!("a buffer of {} numbers for {w}x{h} pixels of 4", pixels.len())));
+            return Err(Error::View(format!(
+                "the buffer has {} numbers; {w}x{h} pixels need {}",
+                pixels.len(),
+                4 * w * h
+            )));
         }
         let mut tell = |share| progress.tell(share).map_err(|e| Error::Render(e.to_string()));
         let image = match s.render(&view, &mut tell) {

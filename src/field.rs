@@ -78,7 +78,10 @@ fn measured<T: Number>(
     component: Component,
 ) -> Result<(Kind, [Normalization; 4], [[f64; 2]; 4])> {
     if n == 0 || !numbers.len().is_multiple_of(n) {
-        return Err(Error::Field(format!("array \"{name}\" has {} values, in tuples of {n}", numbers.len())));
+        return Err(Error::Field(format!(
+            "array \"{name}\" has {} values, which are not a multiple of its {n} components",
+            numbers.len()
+        )));
     }
     let kind = match component {
         Component::Index(i) if i >= n => {

@@ -287,8 +287,8 @@ impl Gpu {
                 *fault = None;
                 let bytes = self.allocated();
                 Err(Error::Device(format!(
-                    "{name} refused memory that it was asked for, with which {bytes} bytes would be allocated; a smaller \
-                     picture, another device, or \"cpu\", may do"
+                    "{name} has not enough memory for the {bytes} bytes that are needed in all; use a smaller picture, another \
+                     device, or \"cpu\""
                 )))
             }
             Some(DeviceFault::Refused(what)) => {

@@ -135,7 +135,7 @@ impl Session {
         };
         if !(distance >= 0.0 && distance.is_finite()) {
             return Err(Error::Render(format!(
-                "samples {distance} apart: they are 0 or more world units from each other"
+                "the distance of samples is {distance}; it must be 0 or more world units"
             )));
         }
         let sampling = if distance > 0.0 { Sampling::Steps(distance) } else { Sampling::Voxels };

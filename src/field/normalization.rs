@@ -204,8 +204,8 @@ impl Chooser {
         if let Some([a, b]) = close.filter(|_| self.close != close) {
             let [lo, hi] = self.range[last];
             tracing::warn!(
-                "the knots of the opacity function at {a} and {b} are closer than 32-bit floats tell values from {lo} to {hi} \
-                 apart where others are as close elsewhere; between them the picture may be wrong"
+                "the knots of the opacity function at {a} and {b} are too close to each other for 32-bit floats, as values are \
+                 from {lo} to {hi} and other knots are far away; between the two the picture may be wrong"
             );
         }
         self.close = close;

@@ -34,7 +34,9 @@ impl Texture {
         if size.iter().any(|&n| n > most) {
             let ([w, h, d], name) = (size, &gpu.adapter.name);
             let size = if is_solid { format!("{w}x{h}x{d}") } else { format!("{w}x{h}") };
-            return Err(Error::Device(format!("{name} has no {label} of {size} pixels, but of {most} at most")));
+            return Err(Error::Device(format!(
+                "{label}: {size} pixels are too many for {name}, which has {most} at most along each side"
+            )));
         }
         let texel = u64::from(format.block_copy_size(None).unwrap_or(16));
         let bytes = size.iter().fold(texel, |n, &s| n * u64::from(s));

@@ -376,9 +376,13 @@ impl Request {
         let others = self.variant.given().join(", ");
         if !others.is_empty() && !matches!(engine, Engine::Project) {
             if self.engine.is_some() {
-                return Err(output::misuse(format!("the projection engine alone has {others}: --engine project")));
+                return Err(output::misuse(format!(
+                    "{others}: only the projection engine has this; add --engine project"
+                )));
             }
-            tracing::warn!("the projection engine alone has {others}, and it does not draw: --engine project");
+            tracing::warn!(
+                "{others}: only the projection engine has this, and another engine draws; add --engine project"
+            );
         }
         let mut renderer = Renderer::with_engine(threads, device, engine)?;
         let of_scene = scene.and_then(|s| s.reconstruction).unwrap_or_default();
@@ -413,7 +417,7 @@ impl Request {
         let given: Vec<_> = engine.into_iter().chain(self.variant.given()).chain(self.integral.given()).collect();
         if !given.is_empty() {
             let given = given.join(", ");
-            return Err(output::misuse(format!("study draws all variants, and leaves no choice by {given}")));
+            return Err(output::misuse(format!("{given}: study draws all variants, so none can be chosen")));
         }
         let choice = scene.map_or(Ok(IntegrationOptions::default()), |s| integral::of_scene(s, &self.input))?;
         let choice = self.integral.apply(choice);
