@@ -9,6 +9,7 @@ pub mod construct;
 pub(crate) mod function;
 pub(crate) mod raster;
 pub(crate) mod rays;
+pub(crate) mod scene;
 pub(crate) mod shader;
 pub(crate) mod sort;
 pub(crate) mod table;

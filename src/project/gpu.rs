@@ -18,6 +18,7 @@ use crate::field::Kind;
 use crate::geometry::{TetMesh, Values};
 use crate::gpu::buffers::{Buffer, Chunks};
 use crate::gpu::raster::{self, Slot, Texture};
+use crate::gpu::scene::DeviceScene;
 use crate::gpu::shader::{ShaderArray, ShaderVariant};
 use crate::gpu::sort::Sorter;
 use crate::gpu::{DeviceChoice, Gpu, Part, arrays, function, table};
@@ -215,13 +216,10 @@ impl Project {
     /// [`Error::Device`] if the device cannot blend into the target, and those of [`Gpu::check`] and [`Buffer::new`].
     pub(crate) fn render<const N: usize>(
         &mut self,
-        geometry: &TetMesh,
-        values: &Values<N>,
-        exact: &Exact<f32>,
-        table: Option<&Arc<PreintegratedTable>>,
-        view: &View,
+        scene: &DeviceScene<'_, N>,
         options: &ProjectionOptions,
     ) -> Result<(Vec<[f32; 4]>, ProjectionCounts)> {
+        let DeviceScene { geometry, values, exact, table, view } = *scene;
         let is_maximum = view.blend() == Blend::Maximum;
         // Nothing is blended, and no segment integrated.
         let format = if is_maximum { wgpu::TextureFormat::Rgba32Float } else { self.format(options.target)? };

@@ -5,6 +5,7 @@ use super::frame::Frame;
 use super::stats::{ProjectionStats, SweepStats};
 use crate::error::{Error, Result};
 use crate::geometry::{TetMesh, Values};
+use crate::gpu::scene::DeviceScene;
 use crate::gpu::{DeviceChoice, Gpu, Part};
 use crate::integral::{Exact, Integral, PreintegratedTable};
 use crate::project::cpu::{self as sweep, Sweep};
@@ -205,6 +206,11 @@ fn integral<'a>(frame: &Frame<'a>) -> Integral<'a> {
     Integral { exact: frame.exact, table: frame.table.map(|t| &**t).filter(|t| t.source().is_none()) }
 }
 
+fn on_device<'a, const N: usize>(frame: &Frame<'a>, values: &'a Values<N>) -> DeviceScene<'a, N> {
+    let Frame { mesh, exact, table, view, .. } = *frame;
+    DeviceScene { geometry: &mesh.geometry, values, exact, table, view }
+}
+
 fn walk<const N: usize>(frame: &Frame, values: &Values<N>) -> DrawnFrame {
     let pixel = |v: &[f32; N]| frame.largest(v);
     let geometry = &frame.mesh.geometry;
@@ -215,7 +221,7 @@ fn walk<const N: usize>(frame: &Frame, values: &Values<N>) -> DrawnFrame {
 fn walk_on<const N: usize>(traverse: &mut Traverse, frame: &Frame, values: &Values<N>) -> Result<DrawnFrame> {
     let geometry = &frame.mesh.geometry;
     let pixel = |v: &[f32; N]| frame.largest(v);
-    let mut drawn = traverse.render(geometry, values, frame.exact, frame.table, frame.view)?;
+    let mut drawn = traverse.render(&on_device(frame, values))?;
     let unfinished = Traverse::unfinished(&drawn.pixels);
     if frame.view.blend() == Blend::Maximum {
         drawn.pixels.par_iter_mut().for_each(|p| *p = Traverse::largest(p).map_or([0.0; 4], |v: [f32; N]| pixel(&v)));
@@ -256,8 +262,8 @@ fn project_by<const N: usize>(sweep: &mut Sweep, frame: &Frame, values: &Values<
 }
 
 fn project_on<const N: usize>(project: &mut Project, frame: &Frame, values: &Values<N>) -> Result<DrawnFrame> {
-    let Frame { mesh, exact, table, view, projection, .. } = frame;
-    let (mut pixels, counts) = project.render(&mesh.geometry, values, exact, *table, view, projection)?;
+    let Frame { mesh, view, projection, .. } = frame;
+    let (mut pixels, counts) = project.render(&on_device(frame, values), projection)?;
     let mut walked = vec![];
     if view.blend() == Blend::Maximum {
         let color = |p: &[f32; 4]| Traverse::largest(p).map_or([0.0; 4], |v: [f32; N]| frame.largest(&v));

@@ -9,6 +9,7 @@ use crate::gpu::clock::Clock;
 use crate::gpu::function;
 use crate::gpu::raster::{Readback, Slot};
 use crate::gpu::rays::{self, FAR};
+use crate::gpu::scene::DeviceScene;
 use crate::gpu::shader::{self, ShaderArray, ShaderVariant};
 use crate::gpu::table::{self, TABLE};
 use crate::gpu::{Gpu, Part, arrays, raster};
@@ -213,14 +214,8 @@ impl Traverse {
     ///
     /// # Errors
     /// Those of [`Gpu::check`] and [`Buffer::new`].
-    pub(crate) fn render<const N: usize>(
-        &mut self,
-        geometry: &TetMesh,
-        values: &Values<N>,
-        exact: &Exact<f32>,
-        table: Option<&Arc<PreintegratedTable>>,
-        view: &View,
-    ) -> Result<WalkedFrame> {
+    pub(crate) fn render<const N: usize>(&mut self, scene: &DeviceScene<'_, N>) -> Result<WalkedFrame> {
+        let DeviceScene { geometry, values, exact, table, view } = *scene;
         self.upload(geometry, values, exact)?;
         self.prepare_table(exact, table)?;
         let association = arrays::association(values);
