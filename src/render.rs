@@ -1,6 +1,7 @@
 //! The whole flow behind one door: mesh, field, transfer function and view in, image out.
 
 mod answer;
+mod automatic;
 mod backend;
 mod cropped;
 mod frame;
