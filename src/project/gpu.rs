@@ -24,7 +24,7 @@ use crate::gpu::sort::Sorter;
 use crate::gpu::{DeviceChoice, Gpu, Part, arrays, function, table};
 use crate::integral::{Exact, PreintegratedTable};
 use crate::order::mpvo::Mpvo;
-use crate::view::{Blend, View};
+use crate::view::Blend;
 use bytemuck::{Pod, Zeroable};
 use drawing::Canvas;
 use frame::SeenView;

@@ -24,7 +24,7 @@ impl Renderer {
             let scalars = automatic::scalars(mesh, None)?;
             let field = scalars.field(mesh)?;
             let scene = automatic::scene(mesh, &tetrahedra, scalars, &field, wishes)?;
-            crate::Result::Ok((tetrahedra, field, scene))
+            Result::Ok((tetrahedra, field, scene))
         })?;
         let (view, _) = scene.view()?;
         self.set_mesh(mesh, tetrahedra);
