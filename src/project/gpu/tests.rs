@@ -12,7 +12,7 @@ use crate::project::gpu::frame::{Limits, ViewUniforms};
 use crate::project::{Compositing, Order};
 use crate::render::{Engine, Renderer};
 use crate::transfer::{Emission, TransferFunction};
-use crate::view::{Camera, ClippingPlane, Projection};
+use crate::view::{Camera, ClippingPlane, Projection, View};
 use glam::{DVec3, dvec3};
 use wgpu::naga;
 
