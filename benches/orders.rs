@@ -4,14 +4,10 @@
 //! Convex meshes, and any by shared faces alone, need no edges of the boundary; those with holes and parts need them. The device draws
 //! its cells in this order; what a frame takes besides is reported by `halite bench --engine project --views 8`: `order_ms` in its JSON.
 
-#![allow(
-    clippy::expect_used,
-    clippy::print_stdout,
-    reason = "a benchmark prints, and has nothing to tell if it cannot start"
-)]
+#![allow(clippy::expect_used, clippy::print_stdout, reason = "tests fail by panicking")]
 
 use glam::{DVec3, dvec3};
-use halite::geometry::Geometry;
+use halite::geometry::TetMesh;
 use halite::mesh::{Mesh, cells::Tetrahedra, faces::Faces, generate};
 use halite::order::mpvo::{Mpvo, Rule};
 use halite::view::{Camera, Projection, View};
@@ -42,7 +38,7 @@ fn measure(name: &str, mesh: &Mesh) {
     let geometry = {
         let tetrahedra = Tetrahedra::new(mesh).expect("cells");
         let points = tetrahedra.points(mesh.points());
-        Geometry::new(&points, &tetrahedra, &Faces::new(&points, &tetrahedra.corners))
+        TetMesh::new(&points, &tetrahedra, &Faces::new(&points, &tetrahedra.corners))
     };
     for (edges, rule) in [("shared faces", Rule::Faces), ("and of the boundary", Rule::Mpvo)] {
         let mut mpvo = Mpvo::default();

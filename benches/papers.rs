@@ -9,7 +9,7 @@
 
 #![allow(clippy::expect_used, clippy::print_stdout, reason = "a benchmark that cannot start has nothing to tell")]
 
-use halite::field::{Kind as FieldKind, Normal};
+use halite::field::{Kind as FieldKind, Normalization};
 use halite::gpu::DeviceChoice;
 use halite::gpu::construct::{Construction, Constructor};
 use halite::integral::Exact;
@@ -19,7 +19,7 @@ use halite::transfer::TransferFunction;
 use rayon::prelude::*;
 use std::time::Instant;
 
-const NORMAL: [Normal; 4] = [Normal { mid: 0.0, half: 1.0 }; 4];
+const NORMAL: [Normalization; 4] = [Normalization { mid: 0.0, half: 1.0 }; 4];
 
 /// Lengths of segments reach this far; extinctions are up to 4.
 const LONGEST: f64 = 2.0;
@@ -103,7 +103,7 @@ fn apart(got: &[[f32; 4]], want: &[[f32; 4]]) -> [f64; 2] {
 }
 
 /// The root mean square error of some thousand texels against adaptive integration.
-fn judged(transfer: &TransferFunction, table: &Table) -> f64 {
+fn rms_error(transfer: &TransferFunction, table: &Table) -> f64 {
     let [w, h, n] = table.size;
     let sum: f64 = (0..2000u32)
         .into_par_iter()
@@ -198,7 +198,7 @@ fn seconds_by_size() {
         ];
         let mut table = Table::closed(&exact, Kind::Uniform, size, LONGEST).expect("a table");
         let time = seconds(|| table.rebuild(&exact));
-        println!("{name:12} {:23} {time:>10.4}    {:.1e}", "closed form, in place", judged(&transfer, &table));
+        println!("{name:12} {:23} {time:>10.4}    {:.1e}", "closed form, in place", rms_error(&transfer, &table));
         let device = device(&transfer);
         let places = std::iter::once(None).chain(device.as_ref().map(Some));
         for (device, last) in places.zip(&mut last) {
@@ -221,7 +221,7 @@ fn seconds_by_size() {
                         ms
                     }),
                 };
-                let rms = judged(&transfer, &made.expect("a table"));
+                let rms = rms_error(&transfer, &made.expect("a table"));
                 println!("{name:12} {way:23} {last:>10.4}    {rms:.1e}{on}");
             }
         }
@@ -280,7 +280,7 @@ fn targets() {
     let fresh = took(25, || Table::closed(&exact, Kind::Uniform, size, LONGEST));
     let mut table = Table::closed(&exact, Kind::Uniform, size, LONGEST).expect("a table");
     let again = took(25, || table.rebuild(&exact));
-    row("volume 256x256x128", fresh, again, format!("{:.1e}", judged(&transfer, &table)));
+    row("volume 256x256x128", fresh, again, format!("{:.1e}", rms_error(&transfer, &table)));
     for degree in [1, 2, 4] {
         let fresh = took(50, || Polynomial::closed(&exact, degree, 512, LONGEST));
         let mut table = Polynomial::closed(&exact, degree, 512, LONGEST).expect("a table");

@@ -2,19 +2,15 @@
 //! with `tiles` or `sorts` after that, one of them. Graphics cards of 2002 and whatever draws here are no match; what
 //! one form takes beside another is.
 
-#![allow(
-    clippy::expect_used,
-    clippy::print_stdout,
-    reason = "a benchmark prints, and has nothing to tell if it cannot start"
-)]
+#![allow(clippy::expect_used, clippy::print_stdout, reason = "tests fail by panicking")]
 
 use glam::DVec3;
 use halite::field::{Association, Component, Field};
 use halite::gpu::DeviceChoice;
-use halite::integral::choice::{Choice, Form, Planes, Texels};
+use halite::integral::options::{Form, IntegrationOptions, Planes, Texels};
 use halite::integral::table::Kind;
 use halite::mesh::{Array, Cells, Mesh, Values, cells::Tetrahedra};
-use halite::project::{Fragments, Order, Switches, Target};
+use halite::project::{Fragments, Order, ProjectionOptions, Target};
 use halite::render::{Engine, Renderer};
 use halite::transfer::TransferFunction;
 use halite::view::{Camera, Projection, View};
@@ -132,22 +128,33 @@ fn tiles_against_volumes(mut renderer: Renderer) {
     };
     let color = (0..4).flat_map(band).collect();
     renderer.set_transfer(&TransferFunction::new(color, vec![(0.0, 1.0)], 0.5).expect("a function"));
-    let switches = Switches { fragments: Fragments::Interpolated, target: Target::Rgba8, ..Switches::default() };
+    let projection =
+        ProjectionOptions { fragments: Fragments::Interpolated, target: Target::Rgba8, ..ProjectionOptions::default() };
     let texels = Texels::Unorm8;
-    let volume = Choice { lengths: Kind::Uniform, table: Some([64; 3]), texels, ..Choice::of(Form::Volume) };
-    let tiles =
-        |planes, per_cell| Choice { planes, per_cell, table: Some([64; 3]), texels, ..Choice::of(Form::Cylindrical) };
+    let volume = IntegrationOptions {
+        lengths: Kind::Uniform,
+        table: Some([64; 3]),
+        texels,
+        ..IntegrationOptions::of(Form::Volume)
+    };
+    let tiles = |planes, per_cell| IntegrationOptions {
+        planes,
+        per_cell,
+        table: Some([64; 3]),
+        texels,
+        ..IntegrationOptions::of(Form::Cylindrical)
+    };
     println!("  {:44} {:>8}", "", "frames/s");
-    for (name, choice, switches) in [
-        ("3D texture", volume, switches),
-        ("tiles, two planes of each cell", tiles(Planes::Two, true), switches),
-        ("tiles, one plane of each cell", tiles(Planes::One, true), switches),
-        ("tiles, two planes of each fragment", tiles(Planes::Two, false), switches),
-        ("tiles with two triangles", tiles(Planes::Packed, true), switches),
-        ("exact", Choice::default(), switches),
-        ("exact, intersected, 32-bit floats", Choice::default(), Switches::default()),
+    for (name, choice, projection) in [
+        ("3D texture", volume, projection),
+        ("tiles, two planes of each cell", tiles(Planes::Two, true), projection),
+        ("tiles, one plane of each cell", tiles(Planes::One, true), projection),
+        ("tiles, two planes of each fragment", tiles(Planes::Two, false), projection),
+        ("tiles with two triangles", tiles(Planes::Packed, true), projection),
+        ("exact", IntegrationOptions::default(), projection),
+        ("exact, intersected, 32-bit floats", IntegrationOptions::default(), ProjectionOptions::default()),
     ] {
-        renderer.set_switches(switches);
+        renderer.set_projection(projection);
         renderer.set_integral(choice);
         let rate = rate(&mut renderer, |_| around(DVec3::ZERO, 1.0, 0.0), [512, 384], false);
         println!("  {name:44} {rate:>8.1}");
@@ -195,7 +202,7 @@ fn sorts_and_data(mut renderer: Renderer) {
         let opacity = vec![(at(0.0), 0.0), (at(0.3), 0.1), (at(0.45), 0.6), (at(0.6), 0.1), (at(1.0), 0.8)];
         let unit = (high - low).length() / 10.0;
         renderer.set_transfer(&TransferFunction::new(color, opacity, unit).expect("a function"));
-        renderer.set_integral(Choice::of(Form::Polynomial));
+        renderer.set_integral(IntegrationOptions::of(Form::Polynomial));
         println!("  {name}, {count} tetrahedra");
         let mut numeric = None;
         for (sort, order) in [
@@ -206,8 +213,9 @@ fn sorts_and_data(mut renderer: Renderer) {
             ("by circumspheres", Order::Circumsphere),
             ("none", Order::None),
         ] {
-            let switches = Switches { order, fragments: Fragments::Interpolated, ..Switches::default() };
-            renderer.set_switches(switches);
+            let projection =
+                ProjectionOptions { order, fragments: Fragments::Interpolated, ..ProjectionOptions::default() };
+            renderer.set_projection(projection);
             let camera = |step: f64| around(low.midpoint(high), (high - low).length() / 2.0, step);
             let rate = rate(&mut renderer, camera, [1280, 960], true);
             let ratio = *numeric.get_or_insert(rate) / rate;

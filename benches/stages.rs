@@ -5,8 +5,8 @@
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec3;
-use halite::field::{Component, Field, Kind, Normal};
-use halite::geometry::Geometry;
+use halite::field::{Component, Field, Kind, Normalization};
+use halite::geometry::TetMesh;
 use halite::gpu::{self, DeviceChoice};
 use halite::integral::{Exact, Light};
 use halite::mesh::{Mesh, cells::Tetrahedra, faces::Faces, generate};
@@ -75,12 +75,12 @@ fn before_drawing(c: &mut Criterion) {
     let tetrahedra = Tetrahedra::new(&mesh).expect("cells");
     group.bench_function("faces", |b| b.iter(|| Faces::new(mesh.points(), &tetrahedra.corners)));
     let faces = Faces::new(mesh.points(), &tetrahedra.corners);
-    group.bench_function("geometry", |b| b.iter(|| Geometry::new(mesh.points(), &tetrahedra, &faces)));
+    group.bench_function("geometry", |b| b.iter(|| TetMesh::new(mesh.points(), &tetrahedra, &faces)));
     group.finish();
 }
 
 fn integral(c: &mut Criterion) {
-    let normal = [Normal { mid: 0.0, half: 1.0 }; 4];
+    let normal = [Normalization { mid: 0.0, half: 1.0 }; 4];
     let mut group = c.benchmark_group("integral");
     for convention in [Convention::Extinction, Convention::Opacity] {
         let transfer = transfer(convention);

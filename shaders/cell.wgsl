@@ -2,20 +2,20 @@
 
 /// A place or direction as the sum of two vectors: one float tells places to 1e-7 only, and a steep transfer function
 /// shows that.
-struct Twice {
+struct DoubleSingle {
     high: vec3f,
     low: vec3f,
 }
 
-fn single(v: vec3f) -> Twice {
-    return Twice(v, vec3f());
+fn single(v: vec3f) -> DoubleSingle {
+    return DoubleSingle(v, vec3f());
 }
 
 /// A ray's own coordinates: two axes across it, of unit length, and one along it, in lengths of its direction.
 struct Ray {
-    origin: Twice,
+    origin: DoubleSingle,
     /// The high part has 12 digits.
-    direction: Twice,
+    direction: DoubleSingle,
     /// Its length.
     length: f32,
     /// A unit vector.
@@ -42,10 +42,10 @@ struct Step {
 const NOWHERE = 3u;
 
 /// The sum of two vectors, with what its rounding left (Knuth 1969, 4.2.2 B).
-fn sum(a: vec3f, b: vec3f) -> Twice {
+fn sum(a: vec3f, b: vec3f) -> DoubleSingle {
     let s = computed(a + b);
     let v = computed(s - a);
-    return Twice(s, (a - (s - v)) + (b - v));
+    return DoubleSingle(s, (a - (s - v)) + (b - v));
 }
 
 /// `v`. Compilers may take (a + b) - a for b, and Mesa's does, but not across this.
@@ -59,14 +59,14 @@ fn shortened(v: vec3f) -> vec3f {
 }
 
 /// v[0] + x v[1] + y v[2], for whole numbers x and y of 14 digits and high parts of v[1] and v[2] of 10.
-fn affine(v: array<Twice, 3>, x: f32, y: f32) -> Twice {
+fn affine(v: array<DoubleSingle, 3>, x: f32, y: f32) -> DoubleSingle {
     let first = sum(v[0].high, v[1].high * x);
     let second = sum(first.high, v[2].high * y);
     return sum(second.high, (first.low + second.low) + (v[0].low + (v[1].low * x + v[2].low * y)));
 }
 
 /// The frame of the ray from `origin` along `direction` (Duff et al. 2017).
-fn ray_along(origin: Twice, direction: Twice) -> Ray {
+fn ray_along(origin: DoubleSingle, direction: DoubleSingle) -> Ray {
     let high = shortened(direction.high);
     let low = (direction.high - high) + direction.low;
     let size = length(direction.high);
@@ -76,14 +76,14 @@ fn ray_along(origin: Twice, direction: Twice) -> Ray {
     let b = n.x * n.y * a;
     let right = vec3f(1.0 + side * n.x * n.x * a, side * b, -side * n.x);
     let up = vec3f(b, side + n.y * n.y * a, -n.y);
-    return Ray(origin, Twice(high, low), size, n, right, up);
+    return Ray(origin, DoubleSingle(high, low), size, n, right, up);
 }
 
 /// `p` in the coordinates of the ray: two across it, and the two parts of one along it. What lies along the ray is
 /// taken off before the axes across it are asked, so that the places across it are as accurate as they are small. Every
 /// fma is written out, so that a point gets the same bits for each of its cells; tiny coordinates become 0, so that no
 /// product of two underflows.
-fn project(ray: Ray, p: Twice) -> vec4f {
+fn project(ray: Ray, p: DoubleSingle) -> vec4f {
     let q = sum(p.high, -ray.origin.high);
     let t = shortened(vec3f(dot_fma(q.high, ray.along) / ray.length));
     let low = q.low + (p.low - ray.origin.low);
@@ -100,7 +100,7 @@ fn dot_fma(a: vec3f, b: vec3f) -> f32 {
 
 /// Twice the area of the triangle (origin, a, b): positive if it turns counter-clockwise. Products are taken with what
 /// their rounding leaves (Dekker 1971), as faces seen edge-on are nothing but that.
-fn area(a: vec4f, b: vec4f) -> f32 {
+fn orient2d(a: vec4f, b: vec4f) -> f32 {
     let c = b.yx;
     let p = rounded(a.xy * c);
     let a_high = shortened_pair(a.xy);
@@ -120,7 +120,7 @@ fn shortened_pair(v: vec2f) -> vec2f {
     return bitcast<vec2f>(bitcast<vec2u>(v) & vec2u(0xfffff000u));
 }
 
-/// Whether the origin lies to the left of the line from `a` to `b`, whose area is `twice`. Exact, and never the same
+/// Whether the origin lies to the left of the line from `a` to `b`, whose `orient2d` is `twice`. Exact, and never the same
 /// for (b, a) unless the two coincide.
 fn is_left(a: vec4f, b: vec4f, twice: f32) -> bool {
     if abs(twice) > DOUBT * (abs(a.x * b.y) + abs(a.y * b.x)) {
@@ -168,7 +168,7 @@ fn product(a: f32, b: f32) -> vec4i {
 
 /// The areas of the triangle (a, b, c).
 fn areas_of(a: vec4f, b: vec4f, c: vec4f) -> vec3f {
-    return vec3f(area(b, c), area(c, a), area(a, b));
+    return vec3f(orient2d(b, c), orient2d(c, a), orient2d(a, b));
 }
 
 /// Whether the triangle (a, b, c) with these areas turns counter-clockwise around the origin.
@@ -184,7 +184,7 @@ fn holds(a: vec4f, b: vec4f, c: vec4f, areas: vec3f) -> bool {
 
 /// Walks through the cell that has this face and the further corner `apex`, to the other face that holds the origin.
 fn step(face: Face, apex: vec4f) -> Step {
-    let to = vec3f(area(apex, face.a), area(apex, face.b), area(apex, face.c));
+    let to = vec3f(orient2d(apex, face.a), orient2d(apex, face.b), orient2d(apex, face.c));
     let a = is_left(apex, face.a, to.x);
     let b = is_left(apex, face.b, to.y);
     let c = is_left(apex, face.c, to.z);

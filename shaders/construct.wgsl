@@ -18,7 +18,7 @@ struct Node {
     colour: vec4f,
 }
 
-struct Job {
+struct BuildJob {
     /// Values, planes (of a cylinder) or slices, and the first slice that is meant.
     size: u32,
     slices: u32,
@@ -42,7 +42,7 @@ struct Job {
     weights: array<vec4f, 10>,
 }
 
-@group(1) @binding(0) var<uniform> job: Job;
+@group(1) @binding(0) var<uniform> job: BuildJob;
 @group(1) @binding(1) var<storage, read> parts: array<Part>;
 /// Where the parts of each interval begin.
 @group(1) @binding(2) var<storage, read> begin: array<u32>;

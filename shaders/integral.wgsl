@@ -59,10 +59,10 @@ fn opacity_of_depth(d: f32) -> f32 {
     return 1.0 - exponential(-d);
 }
 
-/// What a piece of an optical depth up to MILD does that is `rise` denser at its back than at its front: its opacity,
-/// the weights of its emission, both ends together and the back alone, and how much comes through. See `Piece::mild`
+/// What a piece of an optical depth up to SERIES_DEPTH does that is `rise` denser at its back than at its front: its opacity,
+/// the weights of its emission, both ends together and the back alone, and how much comes through. See `Piece::by_series`
 /// in src/integral.rs.
-fn mild(depth: f32, rise: f32) -> vec4f {
+fn by_series(depth: f32, rise: f32) -> vec4f {
     let square = depth * depth;
     let h = depth * -0.5;
     let powers = fma(h, fma(h, fma(h, fma(h, fma(h, fma(h, fma(h, 1.0 / 40320.0, 1.0 / 5040.0), 1.0 / 720.0), 1.0 / 120.0), 1.0 / 24.0), 1.0 / 6.0), 0.5), 1.0);
@@ -86,22 +86,22 @@ fn mild(depth: f32, rise: f32) -> vec4f {
 fn piece(first_depth: f32, last_depth: f32) -> vec3f {
     let x = max(first_depth, 0.0);
     let y = max(last_depth, 0.0);
-    // Beyond T(u) = DEEP nothing is seen: x u + (y − x) u²/2 = DEEP.
+    // Beyond T(u) = OPAQUE_DEPTH nothing is seen: x u + (y − x) u²/2 = OPAQUE_DEPTH.
     var end = 1.0;
-    if x + y > 2.0 * DEEP {
-        end = min(2.0 * DEEP / (x + sqrt(max(x * x + 2.0 * DEEP * (y - x), 0.0))), 1.0);
+    if x + y > 2.0 * OPAQUE_DEPTH {
+        end = min(2.0 * OPAQUE_DEPTH / (x + sqrt(max(x * x + 2.0 * OPAQUE_DEPTH * (y - x), 0.0))), 1.0);
     }
-    let steps = f32(u32(min(max(x, x + (y - x) * end) * end * (1.0 / MILD), 64.0))) + 1.0;
+    let steps = f32(u32(min(max(x, x + (y - x) * end) * end * (1.0 / SERIES_DEPTH), 64.0))) + 1.0;
     let width = end / steps;
     var start = 0.0;
-    var through = 1.0;
+    var transmittance = 1.0;
     var sum = vec3f();
     loop {
         let first = (x + (y - x) * start) * width;
         let rise = (y - x) * width * width;
-        let p = mild(first + 0.5 * rise, rise);
-        sum += through * vec3f(p.x, select(1.0, width, DIRECT) * vec2f(p.y, start * p.y + width * p.z));
-        through *= p.w;
+        let p = by_series(first + 0.5 * rise, rise);
+        sum += transmittance * vec3f(p.x, select(1.0, width, DIRECT) * vec2f(p.y, start * p.y + width * p.z));
+        transmittance *= p.w;
         start += width;
         work++;
         if start > end - 0.5 * width {

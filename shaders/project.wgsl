@@ -2,7 +2,7 @@
 
 /// All rays of a frame, as in traverse.wgsl, but seen from `base`: the place where the middle one starts. Coordinates
 /// are the mesh's normalised ones, relative to it.
-struct Frame {
+struct ViewUniforms {
     /// The base as the sum of two numbers, the second much smaller.
     base: vec4f,
     base_low: vec4f,
@@ -14,8 +14,8 @@ struct Frame {
     origin: array<vec4f, 2>,
     direction: array<vec4f, 3>,
     /// The same by columns and rows, in the mesh's own coordinates: see `affine`.
-    starts: array<Twice, 3>,
-    ways: array<Twice, 3>,
+    starts: array<DoubleSingle, 3>,
+    ways: array<DoubleSingle, 3>,
     /// Width and height of the image, in pixels.
     size: vec2f,
     /// From a pixel's centre to its sample, in units of x and y.
@@ -31,7 +31,7 @@ struct Frame {
     unused: vec2f,
 }
 
-@group(0) @binding(3) var<uniform> frame: Frame;
+@group(0) @binding(3) var<uniform> frame: ViewUniforms;
 /// Clipping planes: dot(p, plane.xyz) + plane.w ≥ 0 is kept.
 @group(0) @binding(4) var<storage, read> planes: array<vec4f>;
 /// Where each ray ends, for want of something nearer.
@@ -69,11 +69,11 @@ fn stretch_of(linear: vec3f, square: vec3f, offset: vec2f) -> f32 {
 }
 
 /// How what is by columns and rows differs from one pixel to the next on the right, and below.
-fn by_column(v: array<Twice, 3>) -> vec3f {
+fn by_column(v: array<DoubleSingle, 3>) -> vec3f {
     return v[1].high + v[1].low;
 }
 
-fn by_row(v: array<Twice, 3>) -> vec3f {
+fn by_row(v: array<DoubleSingle, 3>) -> vec3f {
     return v[2].high + v[2].low;
 }
 

@@ -16,21 +16,21 @@ struct Part {
 @group(2) @binding(2) var<storage, read_write> keys: array<u32>;
 /// Cells from back to front, and, from bit PART on, how many parts of the cell came before.
 @group(2) @binding(3) var<storage, read> order: array<u32>;
-@group(2) @binding(4) var<storage, read_write> records: array<Record>;
+@group(2) @binding(4) var<storage, read_write> primitives: array<Primitive>;
 
 /// Relative to the frame's base.
 fn place(p: Point) -> vec3f {
     return (high_of(p) - frame.base.xyz) + (low_of(p) - frame.base_low.xyz);
 }
 
-fn twice_of(p: Point) -> Twice {
-    return Twice(high_of(p), low_of(p));
+fn double_single_of(p: Point) -> DoubleSingle {
+    return DoubleSingle(high_of(p), low_of(p));
 }
 
 /// A tetrahedron: its corners relative to the frame's base, and in the mesh's own coordinates.
 struct Solid {
     p: array<vec3f, 4>,
-    corners: array<Twice, 4>,
+    corners: array<DoubleSingle, 4>,
 }
 
 fn solid_of(cell: vec4u) -> Solid {
@@ -40,7 +40,7 @@ fn solid_of(cell: vec4u) -> Solid {
     let d = points(cell.w);
     return Solid(
         array<vec3f, 4>(place(a), place(b), place(c), place(d)),
-        array<Twice, 4>(twice_of(a), twice_of(b), twice_of(c), twice_of(d)),
+        array<DoubleSingle, 4>(double_single_of(a), double_single_of(b), double_single_of(c), double_single_of(d)),
     );
 }
 
@@ -90,7 +90,8 @@ fn line_at(low: f32, high: f32) -> u32 {
     return select(i, u32(ends.z), low == high && low == ends.x && ends.z != 0.0);
 }
 
-/// A key that falls as the depth rises; HIDDEN if nothing of the cell is seen. As `keys.rs` finds them on the host.
+/// A key that falls as the depth rises, and ends with one less than the number of parts that the cell is drawn in; HIDDEN if
+/// nothing of the cell is seen.
 fn key_of(cell: u32) -> u32 {
     let corners = cells(cell);
     let v = values_of(cell, corners);
@@ -98,7 +99,7 @@ fn key_of(cell: u32) -> u32 {
         return HIDDEN;
     }
     let s = vec4f(last_of(v[0]), last_of(v[1]), last_of(v[2]), last_of(v[3]));
-    if !shows(min(min(s.x, s.y), min(s.z, s.w)), max(max(s.x, s.y), max(s.z, s.w))) {
+    if !SHOWS_ALL && !shows(least_of(s), greatest_of(s)) {
         return HIDDEN;
     }
     let p = solid_of(corners).p;
@@ -143,8 +144,10 @@ fn key_of(cell: u32) -> u32 {
     }
     let bits = bitcast<u32>(depth);
     let ascending = select(bits | 0x80000000u, ~bits, (bits >> 31u) == 1u);
-    // No finite depth gives HIDDEN.
-    return ~ascending;
+    // Forms that interpolate draw what is left of a cell around the eye as up to three tetrahedra. No finite depth gives
+    // HIDDEN.
+    let parts = select(1u, 3u, FORM != INTERSECTED && any(w < vec4f(frame.nearest)));
+    return (~ascending & ~(MOST_PARTS - 1u)) | (parts - 1u);
 }
 
 @compute @workgroup_size(64)
@@ -164,7 +167,7 @@ fn project_all(@builtin(global_invocation_id) id: vec3u) {
     let entry = order[part.first + i];
     let cell = entry & ((1u << PART) - 1u);
     let corners = cells(cell);
-    write_record(i, solid_of(corners), values_of(cell, corners), entry >> PART, part.rank + i);
+    write_primitive(i, solid_of(corners), values_of(cell, corners), entry >> PART, part.rank + i);
 }
 
 /// How the four directions from the eye to the corners depend on each other: Σ a p = 0, the sum of a being six volumes.

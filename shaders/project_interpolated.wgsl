@@ -3,13 +3,13 @@
 // Kraus, Qiao & Ebert 2004, section 2: of a linear function f only f/w and 1/w are linear on the screen, on the front
 // and on the back; their quotient is what a fragment needs.
 
-// A record is a fan of triangles around the thickest point, which is the first vertex; the outline follows. Each vertex
+// A primitive is a fan of triangles around the thickest point, which is the first vertex; the outline follows. Each vertex
 // has the values on the front and on the back (for INTERPOLATED, over w), 1/w (depth in a parallel view) of both, how
-// much they differ, and how long the ray's way is. The words of a record:
+// much they differ, and how long the ray's way is. The attributes of a primitive:
 // 0    the middle of a pixel at the thickest point, and the depths between which rays are seen (t in a parallel view);
 // 1–2  the stretch of rays around it; and the longest edge;
 // 3    the rank, and which plane of a cylindrical table holds the thickest point;
-// then the lines of the function.
+// then the line of the function that the least value is on.
 // The values: the least and the greatest.
 
 /// To pixels from the upper left corner of the image.
@@ -30,19 +30,19 @@ struct Piece {
     exists: bool,
 }
 
-/// A record of nothing.
+/// A primitive of nothing.
 fn write_nothing(i: u32) {
     for (var k = 0u; k < 5u; k++) {
-        records[i].vertices[k].corner = vec2f(-9.0);
+        primitives[i].vertices[k].corner = vec2f(-9.0);
     }
 }
 
 fn write_vertex(i: u32, k: u32, corner: vec2f, front: Value, back: Value, depths: vec4f) {
     let is_over_w = FORM == INTERPOLATED && PERSPECTIVE;
-    records[i].vertices[k].corner = corner;
-    records[i].vertices[k].front = front * select(1.0, depths.x, is_over_w);
-    records[i].vertices[k].back = back * select(1.0, depths.y, is_over_w);
-    records[i].vertices[k].depths = depths;
+    primitives[i].vertices[k].corner = corner;
+    primitives[i].vertices[k].front = front * select(1.0, depths.x, is_over_w);
+    primitives[i].vertices[k].back = back * select(1.0, depths.y, is_over_w);
+    primitives[i].vertices[k].depths = depths;
 }
 
 /// Whether the eye and `apex` are on the same side of a face.
@@ -121,7 +121,7 @@ fn anticlockwise(corners: array<vec3f, 4>, around: vec4u) -> vec4u {
     return select(around, around.xwzy, a.x * b.y - a.y * b.x > 0.0);
 }
 
-fn write_record(i: u32, whole: Solid, values: array<Value, 4>, piece: u32, rank: u32) {
+fn write_primitive(i: u32, whole: Solid, values: array<Value, 4>, piece: u32, rank: u32) {
     let corners = whole.p;
     var p = corners;
     var v = values;
@@ -178,12 +178,12 @@ fn write_record(i: u32, whole: Solid, values: array<Value, 4>, piece: u32, rank:
     if PLANE_PER_CELL {
         plane = plane_of(last_of(front_value), last_of(back_value), thickness);
     }
-    var words: array<vec4f, 4>;
+    var attributes: array<vec4f, 4>;
     let centre = floor(clamp(pixel_of(inside), vec2f(0.0), frame.size - 1.0)) + 0.5;
     let stretch = stretch_around(direction_at(sample_of(centre)), 1.0);
-    words[0] = vec4f(centre, vec2f(frame.near, frame.far) + frame.forward.w);
-    words[1] = vec4f(stretch[0], longest);
-    words[2] = vec4f(stretch[1], 0.0);
-    words[3] = vec4f(f32(rank & 0xffffffu), plane, 0.0, 0.0);
-    store(i, words, vec4f(), last_of(low), last_of(high), 0.0, 0u, Values(low, high));
+    attributes[0] = vec4f(centre, vec2f(frame.near, frame.far) + frame.forward.w);
+    attributes[1] = vec4f(stretch[0], longest);
+    attributes[2] = vec4f(stretch[1], 0.0);
+    attributes[3] = vec4f(f32(rank & 0xffffffu), plane, 0.0, 0.0);
+    store(i, attributes, vec4f(), last_of(low), last_of(high), Values(low, high));
 }

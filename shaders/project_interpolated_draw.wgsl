@@ -1,12 +1,12 @@
-// Drawing by interpolation: the words and values are those of project_interpolated.wgsl.
+// Drawing by interpolation: the attributes and values are those of project_interpolated.wgsl.
 
 @fragment
-fn fragment(drawn: Drawn) -> Fragment {
-    let words = words_of(drawn);
-    let values = values_in(words);
-    cell_plane = words[3].y;
+fn fragment(drawn: VertexOutput) -> Fragment {
+    let attributes = attributes_of(drawn);
+    let values = values_in(attributes);
+    cell_plane = attributes[3].y;
     let at = drawn.at.xy;
-    let stretch = stretch_of(words[1].xyz, words[2].xyz, at - words[0].xy);
+    let stretch = stretch_of(attributes[1].xyz, attributes[2].xyz, at - attributes[0].xy);
     let depths = drawn.depths;
     var front = drawn.front;
     var back = drawn.back;
@@ -25,11 +25,11 @@ fn fragment(drawn: Drawn) -> Fragment {
     if FORM == LINEAR {
         length = depths.w;
     }
-    length = clamp(length, 0.0, words[1].w);
+    length = clamp(length, 0.0, attributes[1].w);
     front = clamp(front, values[0], values[1]);
     back = clamp(back, values[0], values[1]);
     // As far as it is within the limits.
-    var limits = (words[0].zw - depth) * stretch;
+    var limits = (attributes[0].zw - depth) * stretch;
     if HAS_ENDS || HAS_PLANES {
         let xy = sample_of(at);
         limits = limits_of(at, origin_at(xy), direction_at(xy) / stretch, stretch) - (depth - frame.forward.w) * stretch;
@@ -42,7 +42,5 @@ fn fragment(drawn: Drawn) -> Fragment {
     let rise = back - front;
     back = select(front + rise * (end / length), back, end == length);
     front = select(front + rise * (start / length), front, start == 0.0);
-    // Lines count values from the cell's least.
-    let least = select(Value(), values[0], COLORING == EXACT && LINES > 0u);
-    return fragment_of(front - least, back - least, end - start, words, at, u32(words[3].x));
+    return fragment_of(front, back, end - start, attributes, at, u32(attributes[3].x));
 }

@@ -1,14 +1,14 @@
 // The form that intersects each pixel's ray with the cell: the outline only says which pixels may be met.
 
-// The words of a record:
+// The attributes of a primitive:
 // 0–2  the cell's facets, counted from the middle of a pixel amid it;
-// 3    that middle, how far it is from the least value to the greatest, and bits: which facets are entered, and, of 16,
-//      whether the last is the reference that the others count from;
+// 3    that middle, nothing, and bits: which facets are entered, and, of 16, whether the last is the reference that the
+//      others count from;
 // 4–5  the stretch of rays around it, times the cell's depth; and the longest edge;
-// then, where anything cuts rays off or is dithered, the nearnesses between which they are seen, the cell's depth (t in a
-// parallel view) and the rank; and the lines of the function.
+// then, where anything cuts rays off or is dithered, the inverse depths between which they are seen, the cell's depth (t in a
+// parallel view) and the rank; and the line of the function that the least value is on.
 // The values: in the middle; how it rises from pixel to pixel to the right and down, and towards the eye; the least and
-// the greatest. If they are COUNTED, from the least.
+// the greatest.
 
 /// To pixels from the upper left corner of the image.
 fn pixel_of(p: vec3f) -> vec2f {
@@ -130,48 +130,48 @@ const THIN = 0.25;
 /// Faces that are inclined less than this to the rays are taken for seen edge-on: where rays cross them f32 can't tell.
 const EDGE_ON = 1e-5;
 
-/// By how much rays are aside of pixels' centres when such faces are asked on which side they are, in pixels: of two
+/// How far rays are moved from pixels' centres when such faces are asked on which side they are, in pixels: of two
 /// cells that share one, a ray that lies in it meets exactly one. Less than outlines are grown by.
-const ASIDE = vec2f(4e-4, 1.7e-4);
+const PERTURBATION = vec2f(4e-4, 1.7e-4);
 
 /// From `p` to the point at `t` of a ray from `start` along `way`: as accurate as it is short, as faces that rays graze
 /// ask for that. `t` has 12 digits.
-fn way_to(start: Twice, way: Twice, t: f32, p: Twice) -> vec3f {
+fn way_to(start: DoubleSingle, way: DoubleSingle, t: f32, p: DoubleSingle) -> vec3f {
     let high = shortened(way.high);
     let low = (way.high - high) + way.low;
     let q = sum(p.high, -start.high);
     return (t * high - q.high) + (t * low - (q.low + (p.low - start.low)));
 }
 
-fn added(a: Twice, b: Twice) -> Twice {
+fn added(a: DoubleSingle, b: DoubleSingle) -> DoubleSingle {
     let s = sum(a.high, b.high);
     return sum(s.high, s.low + (a.low + b.low));
 }
 
-fn negated(a: Twice) -> Twice {
-    return Twice(-a.high, -a.low);
+fn negated(a: DoubleSingle) -> DoubleSingle {
+    return DoubleSingle(-a.high, -a.low);
 }
 
 /// The products of components (Dekker 1971).
-fn multiplied(a: Twice, b: Twice) -> Twice {
+fn multiplied(a: DoubleSingle, b: DoubleSingle) -> DoubleSingle {
     let p = computed(a.high * b.high);
     let a_high = shortened(a.high);
     let b_high = shortened(b.high);
     let a_low = a.high - a_high;
     let b_low = b.high - b_high;
     let rest = (((a_high * b_high - p) + a_high * b_low) + a_low * b_high) + a_low * b_low;
-    return Twice(p, rest + (a.high * b.low + a.low * b.high));
+    return DoubleSingle(p, rest + (a.high * b.low + a.low * b.high));
 }
 
-fn crossed(a: Twice, b: Twice) -> Twice {
-    let p = multiplied(Twice(a.high.yzx, a.low.yzx), Twice(b.high.zxy, b.low.zxy));
-    let q = multiplied(Twice(a.high.zxy, a.low.zxy), Twice(b.high.yzx, b.low.yzx));
+fn crossed(a: DoubleSingle, b: DoubleSingle) -> DoubleSingle {
+    let p = multiplied(DoubleSingle(a.high.yzx, a.low.yzx), DoubleSingle(b.high.zxy, b.low.zxy));
+    let q = multiplied(DoubleSingle(a.high.zxy, a.low.zxy), DoubleSingle(b.high.yzx, b.low.yzx));
     return added(p, negated(q));
 }
 
-fn dotted(a: Twice, b: Twice) -> f32 {
+fn dotted(a: DoubleSingle, b: DoubleSingle) -> f32 {
     let p = multiplied(a, b);
-    let whole = added(added(p, Twice(p.high.yzx, p.low.yzx)), Twice(p.high.zxy, p.low.zxy));
+    let whole = added(added(p, DoubleSingle(p.high.yzx, p.low.yzx)), DoubleSingle(p.high.zxy, p.low.zxy));
     return whole.high.x;
 }
 
@@ -181,7 +181,8 @@ fn ending_with(last: u32) -> vec4u {
     return select(halves, halves.yxwz, (last & 1u) == 0u);
 }
 
-fn write_record(i: u32, solid: Solid, own_values: array<Value, 4>, piece: u32, rank: u32) {
+/// A cell is drawn as a whole: there is no `piece` but the first.
+fn write_primitive(i: u32, solid: Solid, own_values: array<Value, 4>, piece: u32, rank: u32) {
     let p = solid.p;
     var around: array<vec2f, 4>;
     let corners = array<vec3f, 4>(seen(p[0]), seen(p[1]), seen(p[2]), seen(p[3]));
@@ -199,7 +200,7 @@ fn write_record(i: u32, solid: Solid, own_values: array<Value, 4>, piece: u32, r
     let last = select(select(select(3u, 2u, shown.z == largest), 1u, shown.y == largest), 0u, shown.x == largest);
     let to = ending_with(last);
     var own = solid.corners;
-    let at = array<Twice, 4>(own[to.x], own[to.y], own[to.z], own[to.w]);
+    let at = array<DoubleSingle, 4>(own[to.x], own[to.y], own[to.z], own[to.w]);
     var given = own_values;
     let v = array<Value, 4>(given[to.x], given[to.y], given[to.z], given[to.w]);
     let ab = added(at[1], negated(at[0]));
@@ -218,7 +219,7 @@ fn write_record(i: u32, solid: Solid, own_values: array<Value, 4>, piece: u32, r
     // eye.
     var t = dot(centroid, frame.forward.xyz);
     if PERSPECTIVE {
-        // Around the eye, as far as the cell goes: nearnesses of what is much farther cancel.
+        // Around the eye, as far as the cell goes: inverse depths of what is much farther cancel.
         t = max(t, max(frame.nearest, 0.5 * longest) - frame.forward.w);
     }
     // Few digits, so that products with it are exact.
@@ -261,11 +262,11 @@ fn write_record(i: u32, solid: Solid, own_values: array<Value, 4>, piece: u32, r
     let low = min(min(v[0], v[1]), min(v[2], v[3]));
     let high = max(max(v[0], v[1]), max(v[2], v[3]));
     let rises = array<Value, 3>(v[1] - v[0], v[2] - v[0], v[3] - v[0]);
-    var middle = v[0] - select(Value(), low, COUNTED);
+    var middle = v[0];
     var to_right: Value;
     var to_below: Value;
     var towards_eye: Value;
-    // Nearnesses of a flat cell's faces differ by little, and their differences by their common edges do not cancel:
+    // Inverse depths of a flat cell's faces differ by little, and their differences by their common edges do not cancel:
     // n_j × n_d is an edge, times the volume.
     let reference = vec3f(heights.w, across.w, along_rows.w) / slopes.w;
     let thickness = volume / slopes.w;
@@ -302,29 +303,27 @@ fn write_record(i: u32, solid: Solid, own_values: array<Value, 4>, piece: u32, r
         towards_eye = -(share[0] * dot(out, n[1]) + share[1] * dot(out, n[2]) + share[2] * dot(out, n[3]));
         facets = array<vec4f, 3>(heights / slopes, across / slopes, along_rows / slopes);
     }
-    heights += ASIDE.x * across + ASIDE.y * along_rows;
-    var words: array<vec4f, 6>;
-    words[0] = select(facets[0], heights / FLAT, edge_on);
-    words[1] = select(facets[1], across / FLAT, edge_on);
-    words[2] = select(facets[2], along_rows / FLAT, edge_on);
+    heights += PERTURBATION.x * across + PERTURBATION.y * along_rows;
+    var attributes: array<vec4f, 6>;
+    attributes[0] = select(facets[0], heights / FLAT, edge_on);
+    attributes[1] = select(facets[1], across / FLAT, edge_on);
+    attributes[2] = select(facets[2], along_rows / FLAT, edge_on);
     let bits = select(vec4u(0u), vec4u(1u, 2u, 4u, 8u), entered);
     if !(abs(volume) > FLAT) {
         around = array<vec2f, 4>(vec2f(-9.0), vec2f(-9.0), vec2f(-9.0), vec2f(-9.0));
     }
-    words[3] = vec4f(centre, last_of(high) - last_of(low), f32(bits.x | bits.y | bits.z | bits.w | select(0u, 16u, is_measured)));
+    attributes[3] = vec4f(centre, 0.0, f32(bits.x | bits.y | bits.z | bits.w | select(0u, 16u, is_measured)));
     let stretch = stretch_around(way.high, depth);
-    words[4] = vec4f(stretch[0], longest);
-    words[5] = vec4f(stretch[1], 0.0);
+    attributes[4] = vec4f(stretch[0], longest);
+    attributes[5] = vec4f(stretch[1], 0.0);
     var limits = vec2f(t - frame.near, t - frame.far);
     if PERSPECTIVE {
         limits = depth / max(vec2f(frame.near, frame.far) + frame.forward.w, vec2f(AT_EYE)) - 1.0;
     }
     let rare = vec4f(limits, select(t, depth, PERSPECTIVE), f32(rank & 0xffffffu));
-    // In a parallel view the eye is beyond all values.
-    let eye = select(FAR * last_of(towards_eye), last_of(low) + last_of(middle + towards_eye), PERSPECTIVE);
-    store(i, words, rare, last_of(low), last_of(high), eye, piece, Values(middle, to_right, to_below, towards_eye, low, high));
-    records[i].vertices[0].corner = around[0];
-    records[i].vertices[1].corner = around[1];
-    records[i].vertices[2].corner = around[2];
-    records[i].vertices[3].corner = around[3];
+    store(i, attributes, rare, last_of(low), last_of(high), Values(middle, to_right, to_below, towards_eye, low, high));
+    primitives[i].vertices[0].corner = around[0];
+    primitives[i].vertices[1].corner = around[1];
+    primitives[i].vertices[2].corner = around[2];
+    primitives[i].vertices[3].corner = around[3];
 }

@@ -1,7 +1,7 @@
 // The lines of the transfer function, and the exact integral by those that a segment is on, looked up one by one.
 
 /// The lines of the function, LINES_ACROSS in a row: below each other value, slope, and the two ends with the number of the
-/// line of a single value. An image, as drivers in software look buffers up lane by lane, and sample slowly.
+/// line of a single value.
 @group(0) @binding(10) var lines: texture_storage_2d<rgba32float, read>;
 
 /// A line of the function, and between which values it is that.
@@ -54,8 +54,8 @@ fn by_lookups(front: Value, back: Value, length: f32, first: u32) -> vec4f {
         let l = part * length;
         let p = piece(f.x * l, r.x * l);
         let color = (f.yzw * p.y + r.yzw * p.z) * select(1.0, l, DIRECT);
-        let through = 1.0 - p.x;
-        sum = vec4f(fma(color, vec3f(select(1.0, sum.w, rises)), sum.xyz * select(through, 1.0, rises)), sum.w * through);
+        let transmittance = 1.0 - p.x;
+        sum = vec4f(fma(color, vec3f(select(1.0, sum.w, rises)), sum.xyz * select(transmittance, 1.0, rises)), sum.w * transmittance);
         work++;
         if is_last || work > most_work() {
             break;

@@ -1,9 +1,9 @@
 // From a segment of a ray to a fragment; and from a stored corner to a vertex.
 
-/// Of each triangle the first vertex's words are taken. Positions have w = 1, so that all that is not flat is
+/// Of each triangle the first vertex's attributes are taken. Positions have w = 1, so that all that is not flat is
 /// interpolated linearly on the screen.
 @vertex
-fn vertex(stored: Stored) -> Drawn {
+fn vertex(stored: VertexInput) -> VertexOutput {
     let at = stored.corner / frame.size;
     return drawn_at(vec4f(2.0 * at.x - 1.0, 1.0 - 2.0 * at.y, 0.5, 1.0), stored);
 }
@@ -12,11 +12,11 @@ fn most_work() -> u32 {
     return MOST_WORK;
 }
 
-/// Premultiplied colour and opacity of a segment of a cell; with LINES, values count from its least.
-fn colored(front: Value, back: Value, length: f32, words: Words) -> vec4f {
+/// Premultiplied colour and opacity of a segment of a cell.
+fn colored(front: Value, back: Value, length: f32, attributes: Attributes) -> vec4f {
     work = 0u;
     if COLORING == EXACT {
-        return integrated(front, back, length, words);
+        return integrated(front, back, length, attributes);
     }
     if PAIR || RGBA {
         light = vec4f(0.0, 0.0, 0.0, 1.0);

@@ -1,7 +1,7 @@
 // A stable radix sort of keys and the numbers that go with them: for each digit of 4 bits, `count` the digits of each
 // block of items, `sum` these counts up, and `scatter` the items. In the first pass keys of SKIPPED are left out.
 
-struct Pass {
+struct SortPass {
     /// Items at most; in later passes there are `total`, where that is fewer.
     items: u32,
     shift: u32,
@@ -15,7 +15,7 @@ const ITEMS = 256u;
 const ROUNDS = 8u;
 const BLOCK = ITEMS * ROUNDS;
 
-@group(0) @binding(0) var<uniform> digits: Pass;
+@group(0) @binding(0) var<uniform> digits: SortPass;
 @group(0) @binding(1) var<storage, read> keys: array<u32>;
 @group(0) @binding(2) var<storage, read> numbers: array<u32>;
 @group(0) @binding(3) var<storage, read_write> next_keys: array<u32>;

@@ -132,8 +132,8 @@ fn outside(s: f32, length: f32) -> vec4f {
 
 /// `front` before `back`.
 fn joined(front: vec4f, back: vec4f) -> vec4f {
-    let through = 1.0 - front.w;
-    return vec4f(front.xyz + through * back.xyz, 1.0 - through * (1.0 - back.w));
+    let transmittance = 1.0 - front.w;
+    return vec4f(front.xyz + transmittance * back.xyz, 1.0 - transmittance * (1.0 - back.w));
 }
 
 /// A segment of values within ±1.

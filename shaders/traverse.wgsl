@@ -20,9 +20,9 @@ struct Box {
 
 /// All rays of a frame: that of column x and row y starts at origin · (1, x, y) and runs along direction · (1, x, y);
 /// coordinates are the mesh's normalised ones.
-struct Frame {
-    origin: array<Twice, 3>,
-    direction: array<Twice, 3>,
+struct RayUniforms {
+    origin: array<DoubleSingle, 3>,
+    direction: array<DoubleSingle, 3>,
     /// Width and height of the image, in pixels.
     size: vec2u,
     /// The rows that this dispatch draws.
@@ -48,11 +48,11 @@ struct Counts {
     steps: atomic<u32>,
     carry: atomic<u32>,
     /// Rays that were traced again beside their place.
-    repaired: atomic<u32>,
+    retraced: atomic<u32>,
     unused: u32,
 }
 
-@group(0) @binding(3) var<uniform> frame: Frame;
+@group(0) @binding(3) var<uniform> frame: RayUniforms;
 /// Clipping planes: dot(p, plane.xyz) + plane.w ≥ 0 is kept.
 @group(0) @binding(4) var<storage, read> planes: array<vec4f>;
 /// Where each ray ends, for want of something nearer.
@@ -77,7 +77,7 @@ var<private> steps: u32;
 /// that rays which take much work are given up before, and the CPU draws them.
 var<private> finished: bool;
 /// Whether the ray may pass edges of the boundary as closely as it does.
-var<private> anyhow: bool;
+var<private> accept_grazing: bool;
 
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
@@ -137,20 +137,20 @@ fn trace(straight: Ray, limits: vec2f) {
         light = vec4f(0.0, 0.0, 0.0, 1.0);
         largest = Value(-FAR);
         finished = false;
-        anyhow = attempt == 3u;
+        accept_grazing = attempt == 3u;
         follow(ray, limits);
         if finished || work > frame.most_work {
             return;
         }
-        let aside = ASIDE * f32(attempt);
-        ray.origin.low = straight.origin.low + (straight.right + straight.up * 0.618) * aside;
-        atomicAdd(&counts.repaired, select(0u, 1u, attempt == 1u));
+        let perturbation = PERTURBATION * f32(attempt);
+        ray.origin.low = straight.origin.low + (straight.right + straight.up * 0.618) * perturbation;
+        atomicAdd(&counts.retraced, select(0u, 1u, attempt == 1u));
     }
 }
 
 /// Whether nothing behind can be seen.
-fn is_over() -> bool {
-    return light.w < LEAST_LIGHT;
+fn is_terminated() -> bool {
+    return light.w < LEAST_TRANSMITTANCE;
 }
 
 /// Walks from each entry to the next.
@@ -173,7 +173,7 @@ fn follow(ray: Ray, limits: vec2f) {
             if !walk(ray, entry, limits) {
                 return;
             }
-            if is_over() {
+            if is_terminated() {
                 known = 0u;
             }
         }
@@ -242,7 +242,7 @@ fn find_entries(ray: Ray, inverse: vec3f, last: Entry, limit: f32) -> bool {
 
 /// Whether a ray passes a face of the boundary beside its edges, as far as places across it can tell.
 fn is_clear(face: Face) -> bool {
-    if anyhow {
+    if accept_grazing {
         return true;
     }
     let across = max(max(abs(face.a.xy), abs(face.b.xy)), abs(face.c.xy));
@@ -281,9 +281,9 @@ fn face_of(ray: Ray, ids: vec3u) -> Face {
     return Face(a, b, c, areas_of(a, b, c));
 }
 
-fn position(i: u32) -> Twice {
+fn position(i: u32) -> DoubleSingle {
     let p = points(i);
-    return Twice(high_of(p), low_of(p));
+    return DoubleSingle(high_of(p), low_of(p));
 }
 
 /// Walks from an entry until the ray leaves the mesh or ends; false if it got lost.
@@ -357,7 +357,7 @@ fn walk(ray: Ray, entry: Entry, limits: vec2f) -> bool {
                 gather(front, back, vec2f(behind, end) / length, end - behind);
             }
             behind = 0.0;
-            if end < length || is_over() {
+            if end < length || is_terminated() {
                 return true;
             }
         }

@@ -11,7 +11,7 @@ use glam::DVec3;
 
 /// A ray's own coordinates: two axes across it and one along it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Frame {
+pub struct RayFrame {
     origin: DVec3,
     across: [DVec3; 2],
     along: DVec3,
@@ -28,11 +28,11 @@ pub struct Projected {
     pub t: f64,
 }
 
-impl Frame {
+impl RayFrame {
     /// The frame of the ray from `origin` along the unit vector `along`.
     pub fn new(origin: DVec3, along: DVec3) -> Self {
         let (a, b) = along.any_orthonormal_pair();
-        Frame { origin, across: [a, b], along }
+        RayFrame { origin, across: [a, b], along }
     }
 
     /// The ray's origin and direction.
@@ -42,7 +42,7 @@ impl Frame {
 
     /// The same ray, moved sideways by `(x, y)`.
     pub fn shifted(self, x: f64, y: f64) -> Self {
-        Frame { origin: self.origin + self.across[0] * x + self.across[1] * y, ..self }
+        RayFrame { origin: self.origin + self.across[0] * x + self.across[1] * y, ..self }
     }
 
     /// `p` in the coordinates of the ray.
@@ -55,7 +55,7 @@ impl Frame {
 
 /// Twice the area of the triangle (origin, a, b): positive if it turns counter-clockwise.
 #[inline(always)]
-pub fn cross(a: Projected, b: Projected) -> f64 {
+pub fn orient2d(a: Projected, b: Projected) -> f64 {
     a.x * b.y - a.y * b.x
 }
 
@@ -95,7 +95,7 @@ impl Face {
     #[inline(always)]
     pub fn enter(corners: [Projected; 3]) -> Option<Self> {
         let [a, b, c] = corners;
-        let areas = [cross(b, c), cross(c, a), cross(a, b)];
+        let areas = [orient2d(b, c), orient2d(c, a), orient2d(a, b)];
         (is_left(b, c, areas[0]) && is_left(c, a, areas[1]) && is_left(a, b, areas[2]))
             .then_some(Face { corners, areas })
     }
@@ -105,7 +105,7 @@ impl Face {
     #[inline(always)]
     pub fn step(&mut self, apex: Projected) -> usize {
         let [a, b, c] = self.corners;
-        let to = [cross(apex, a), cross(apex, b), cross(apex, c)];
+        let to = [orient2d(apex, a), orient2d(apex, b), orient2d(apex, c)];
         let left = [is_left(apex, a, to[0]), is_left(apex, b, to[1]), is_left(apex, c, to[2])];
         // Of three signs around a triangle that holds the origin exactly one falls from left to right.
         let dropped = if left[0] && !left[1] {
@@ -192,7 +192,7 @@ mod tests {
 
     #[test]
     fn weights_find_the_point_on_the_face() {
-        let frame = Frame::new(DVec3::new(0.2, 0.3, -5.0), DVec3::Z);
+        let frame = RayFrame::new(DVec3::new(0.2, 0.3, -5.0), DVec3::Z);
         let face = [DVec3::new(0.0, 0.0, 1.0), DVec3::new(1.0, 0.0, 2.0), DVec3::new(0.0, 1.0, 4.0)];
         let corners = face.map(|p| frame.project(p));
         let face =

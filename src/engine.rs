@@ -1,6 +1,8 @@
-//! The engines by name: what scenes, the program and hosts ask for.
+//! What scenes, the program and hosts ask for by name: engines, and orders of reconstruction.
 
+use crate::cast;
 use serde::Deserialize;
+use std::str::FromStr;
 
 /// How frames are drawn.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
@@ -13,4 +15,17 @@ pub enum Engine {
     Traverse,
     /// Cells are sorted, projected and blended. See [`crate::project`].
     Project,
+}
+
+impl FromStr for cast::Order {
+    type Err = String;
+
+    /// The order that options know by this name. What is wrong with another names those that there are.
+    fn from_str(name: &str) -> Result<Self, String> {
+        let found = cast::Order::ALL.into_iter().find(|(known, _)| *known == name);
+        found.map(|(_, order)| order).ok_or_else(|| {
+            let known = cast::Order::ALL.map(|(known, _)| known).join(", ");
+            format!("\"{name}\" is not known here; there is {known}")
+        })
+    }
 }

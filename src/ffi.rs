@@ -18,8 +18,8 @@ use crate::field::{Association, Component, Field};
 use crate::grid::Grid;
 use crate::host::{Log, Session, carried, guard, named};
 use crate::image::{Backdrop, Image};
-use crate::integral::Choice;
-use crate::integral::choice::Form;
+use crate::integral::IntegrationOptions;
+use crate::integral::options::Form;
 use crate::memory;
 use crate::mesh::{Array, Cells, Mesh, Polyhedra};
 use bridge::{FieldSpec, IntegralSpec, Numbers, Stats, TransferSpec, Type, ViewSpec};
@@ -189,7 +189,7 @@ mod bridge {
         upload_ms: f64,
         frame_ms: f64,
         steps: u64,
-        repaired_rays: u64,
+        retraced_rays: u64,
         device_bytes: u64,
         uploaded_bytes: u64,
     }
@@ -298,9 +298,9 @@ fn set_integral(session: &mut Session, spec: IntegralSpec) -> Result<()> {
 }
 
 /// What the form reads of a specification, and nothing else of it.
-fn choice(spec: &IntegralSpec) -> Result<Choice> {
+fn choice(spec: &IntegralSpec) -> Result<IntegrationOptions> {
     let form = named("integral", spec.form)?;
-    let mut choice = Choice::of(form);
+    let mut choice = IntegrationOptions::of(form);
     if form == Form::Exact {
         return Ok(choice);
     }
@@ -333,7 +333,7 @@ fn table(size: [i32; 3]) -> Result<Option<[u32; 3]>> {
         [Ok(front), Ok(back), Ok(depth)] => Ok(Some([front, back, depth])),
         _ => {
             let size = size.map(|n| n.to_string()).join(" x ");
-            Err(Error::Render(format!("a table of {size} texels cannot be; 0 x 0 x 0 is the default")))
+            Err(Error::Render(format!("there can be no table of {size} texels; 0 x 0 x 0 chooses the default size")))
         }
     }
 }
@@ -417,7 +417,11 @@ fn render(session: &mut Session, spec: ViewSpec, pixels: &mut [f32], progress: &
         let view = view(&spec)?;
         let (w, h) = (spec.width as usize, spec.height as usize);
         if pixels.len() != 4 * w * h {
-            return Err(Error::View(format!("a buffer of {} numbers for {w}x{h} pixels of 4", pixels.len())));
+            return Err(Error::View(format!(
+                "the buffer has {} numbers; {w}x{h} pixels need {}",
+                pixels.len(),
+                4 * w * h
+            )));
         }
         let mut tell = |share| progress.tell(share).map_err(|e| Error::Render(e.to_string()));
         let image = match s.render(&view, &mut tell) {
@@ -446,7 +450,7 @@ fn stats(session: &Session) -> Result<Stats> {
             upload_ms: s.upload_ms,
             frame_ms: s.frame_ms,
             steps: s.steps,
-            repaired_rays: s.repaired_rays,
+            retraced_rays: s.retraced_rays,
             device_bytes: s.device_bytes,
             uploaded_bytes: s.uploaded_bytes,
         })

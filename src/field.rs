@@ -2,12 +2,12 @@
 
 pub mod gradient;
 pub mod histogram;
-pub(crate) mod normal;
+pub(crate) mod normalization;
 
 use crate::error::{Error, Result};
 use crate::mesh::{Array, Arrays, Values, with_values};
 pub use gradient::Gradient;
-pub use normal::Normal;
+pub use normalization::Normalization;
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -63,7 +63,7 @@ pub struct Field {
     association: Association,
     kind: Kind,
     values: Arc<Values>,
-    normal: [Normal; 4],
+    normal: [Normalization; 4],
     range: [[f64; 2]; 4],
     second: Option<Arc<Field>>,
     missing: Option<f64>,
@@ -76,9 +76,12 @@ fn measured<T: Number>(
     numbers: &[T],
     n: usize,
     component: Component,
-) -> Result<(Kind, [Normal; 4], [[f64; 2]; 4])> {
+) -> Result<(Kind, [Normalization; 4], [[f64; 2]; 4])> {
     if n == 0 || !numbers.len().is_multiple_of(n) {
-        return Err(Error::Field(format!("array \"{name}\" has {} values, in tuples of {n}", numbers.len())));
+        return Err(Error::Field(format!(
+            "array \"{name}\" has {} values, which are not a multiple of its {n} components",
+            numbers.len()
+        )));
     }
     let kind = match component {
         Component::Index(i) if i >= n => {
@@ -116,10 +119,10 @@ fn measured<T: Number>(
             return Err(Error::Field(format!("array \"{name}\" holds no finite value")));
         }
     }
-    let mut normal = range.map(|r| Normal::new(r[0], r[1]));
+    let mut normal = range.map(|r| Normalization::new(r[0], r[1]));
     if kind == Kind::Rgba {
         // The colour needs no function, only its own scale: bytes are 255ths, anything else is taken as it is.
-        normal[..3].fill(Normal { mid: 0.0, half: T::FULL });
+        normal[..3].fill(Normalization { mid: 0.0, half: T::FULL });
     }
     Ok((kind, normal, range))
 }
@@ -296,7 +299,7 @@ impl Field {
 
     /// The map of all finite values of component `k` to [−1, 1]; for colours of [`Kind::Rgba`], of what is a full one to
     /// 1.
-    pub fn normal(&self, k: usize) -> Normal {
+    pub fn normal(&self, k: usize) -> Normalization {
         self.normal[k]
     }
 

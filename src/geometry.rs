@@ -7,7 +7,7 @@ pub mod boundary;
 pub mod contacts;
 
 use crate::error::{Error, Result};
-use crate::field::normal::{self, Normal};
+use crate::field::normalization::{self, Normalization};
 use crate::field::{Association, Field};
 use crate::mesh::cells::Tetrahedra;
 use crate::mesh::faces::{BOUNDARY, Faces};
@@ -23,7 +23,7 @@ const FLATTEST: f64 = 5e-5;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, bytemuck::Pod, Zeroable)]
 #[repr(C)]
 pub struct Cell {
-    /// Indices into [`Geometry::points`].
+    /// Indices into [`TetMesh::points`].
     pub corners: [u32; 4],
     /// `neighbours[k]` lies beyond the face opposite to corner k; [`BOUNDARY`] if nothing does.
     pub neighbours: [u32; 4],
@@ -32,7 +32,7 @@ pub struct Cell {
 /// A mesh made ready to be drawn: coordinates relative to its centre and within [−1, 1], points and cells along a
 /// space-filling curve, points at one position made one.
 #[derive(Debug, Clone, Default)]
-pub struct Geometry {
+pub struct TetMesh {
     /// The middle of the mesh's bounds, in world coordinates.
     pub centre: DVec3,
     /// Normalised coordinates are (world − centre) · scale; a power of two.
@@ -54,7 +54,7 @@ pub struct Geometry {
     left_handed: Vec<u64>,
 }
 
-impl Geometry {
+impl TetMesh {
     /// Prepares `tetrahedra`, whose corners index into `points`: see [`Tetrahedra::points`].
     pub fn new(points: &[DVec3], tetrahedra: &Tetrahedra, faces: &Faces) -> Self {
         let corners = &tetrahedra.corners;
@@ -95,7 +95,7 @@ impl Geometry {
         let boundary = Boundary::new(&points, boundary);
         let left_handed = left_handed(&faces.orientation, |i| tetrahedron_of[i] as usize);
         let welded = faces.weld.is_some();
-        Geometry { centre, scale, points, cells, boundary, point_of, tetrahedron_of, welded, left_handed }
+        TetMesh { centre, scale, points, cells, boundary, point_of, tetrahedron_of, welded, left_handed }
     }
 
     /// Prepares `tetrahedra` for engines that do not walk: cells have no neighbours, and there is no boundary.
@@ -215,7 +215,7 @@ impl Geometry {
     }
 }
 
-/// The values of a field with `N` components, in the order of a [`Geometry`], normalised: what the transfer function tells
+/// The values of a field with `N` components, in the order of a [`TetMesh`], normalised: what the transfer function tells
 /// apart is in [−1, 1] or near it, and outliers are up to 2⁴⁰ away.
 #[derive(Debug, Clone)]
 pub enum Values<const N: usize> {
@@ -234,12 +234,12 @@ impl<const N: usize> Values<N> {
     /// # Errors
     /// [`Error::Field`] if there are not as many values as points or cells.
     pub fn new(
-        geometry: &Geometry,
+        geometry: &TetMesh,
         tetrahedra: &Tetrahedra,
         points: usize,
         cells: usize,
         field: &Field,
-        normal: &[Normal; 4],
+        normal: &[Normalization; 4],
     ) -> Result<Self> {
         let (what, count) = match field.association() {
             Association::Point => ("points", points),
@@ -249,7 +249,7 @@ impl<const N: usize> Values<N> {
             return Err(Error::Field(format!("the field has {} values for {count} {what}", field.len() / N)));
         }
         let limits: [f64; N] =
-            std::array::from_fn(|k| if N == 4 && k < 3 { normal::MOST_COLOUR } else { normal::MOST });
+            std::array::from_fn(|k| if N == 4 && k < 3 { normalization::MOST_COLOUR } else { normalization::MOST });
         let brought = |value: &dyn Fn(usize) -> f64| std::array::from_fn(|k| normal[k].bounded(value(k), limits[k]));
         if field.association() == Association::Cell {
             return Ok(Self::of_cells(geometry, tetrahedra, |c| brought(&|k| field.value(c * N + k))));
@@ -263,7 +263,7 @@ impl<const N: usize> Values<N> {
 
     /// The values of the cells of the mesh, in the order of `geometry`, made from `tetrahedra`.
     pub(crate) fn of_cells(
-        geometry: &Geometry,
+        geometry: &TetMesh,
         tetrahedra: &Tetrahedra,
         value: impl Fn(usize) -> [f32; N] + Sync,
     ) -> Self {
@@ -273,7 +273,7 @@ impl<const N: usize> Values<N> {
 
     /// The values of the points of the mesh and those that its split added, likewise.
     pub(crate) fn of_points(
-        geometry: &Geometry,
+        geometry: &TetMesh,
         tetrahedra: &Tetrahedra,
         value: impl Fn(u32) -> [f32; N] + Sync,
     ) -> Self {
@@ -300,7 +300,7 @@ impl<const N: usize> Values<N> {
     }
 }
 
-/// The bits of [`Geometry::left_handed`], of the signs of the volumes of tetrahedra and the one that each cell is.
+/// The bits of [`TetMesh::left_handed`], of the signs of the volumes of tetrahedra and the one that each cell is.
 fn left_handed(orientation: &[i8], tetrahedron: impl Fn(usize) -> usize + Sync) -> Vec<u64> {
     let n = orientation.len();
     let word = |w: usize| {

@@ -9,6 +9,7 @@ pub mod construct;
 pub(crate) mod function;
 pub(crate) mod raster;
 pub(crate) mod rays;
+pub(crate) mod scene;
 pub(crate) mod shader;
 pub(crate) mod sort;
 pub(crate) mod table;
@@ -81,6 +82,16 @@ pub struct Description {
     pub lacks: Option<String>,
 }
 
+impl Description {
+    /// Whether it is a driver in software, which draws on the CPU.
+    pub fn is_software(&self) -> bool {
+        self.kind == SOFTWARE
+    }
+}
+
+/// The kind of drivers in software.
+const SOFTWARE: &str = "CPU";
+
 /// Features without which an adapter is of no use: none beyond compute shaders and [`LIMITS`].
 const REQUIRED: wgpu::Features = wgpu::Features::empty();
 
@@ -112,7 +123,7 @@ fn describe(index: usize, adapter: &wgpu::Adapter) -> Description {
         wgpu::DeviceType::DiscreteGpu => "discrete GPU",
         wgpu::DeviceType::IntegratedGpu => "integrated GPU",
         wgpu::DeviceType::VirtualGpu => "virtual GPU",
-        wgpu::DeviceType::Cpu => "CPU",
+        wgpu::DeviceType::Cpu => SOFTWARE,
         wgpu::DeviceType::Other => "other",
     };
     let (limits, missing) = (adapter.limits(), REQUIRED - adapter.features());
@@ -163,12 +174,12 @@ pub(crate) struct Gpu {
     pub(crate) binding: u64,
     allocated: Arc<AtomicU64>,
     uploaded: AtomicU64,
-    fault: Arc<Mutex<Option<Fault>>>,
+    fault: Arc<Mutex<Option<DeviceFault>>>,
 }
 
 /// What went wrong first.
 #[derive(Debug, Clone)]
-enum Fault {
+enum DeviceFault {
     Lost(String),
     OutOfMemory,
     Refused(String),
@@ -188,7 +199,7 @@ impl Gpu {
         let all: Vec<_> = adapters().into_iter().enumerate().map(|(i, a)| (describe(i, &a), a)).collect();
         let known = all.iter().map(|(d, _)| format!("{} ({})", d.index, d.name)).collect::<Vec<_>>().join(", ");
         let found = all.into_iter().find(|(d, _)| match &name {
-            None => d.kind != "CPU" && d.lacks.is_none(),
+            None => !d.is_software() && d.lacks.is_none(),
             Some(n) => match n.parse::<usize>() {
                 Ok(index) => d.index == index,
                 Err(_) => d.name.to_ascii_lowercase().contains(n) || (!d.uuid.is_empty() && d.uuid == *n),
@@ -222,12 +233,12 @@ impl Gpu {
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
             .map_err(|e| Error::Device(format!("{} cannot be opened: {e}", description.name)))?;
         let fault = Arc::new(Mutex::new(None));
-        let keep = |fault: &Arc<Mutex<Option<Fault>>>| {
+        let keep = |fault: &Arc<Mutex<Option<DeviceFault>>>| {
             let fault = Arc::clone(fault);
-            move |new: Fault| {
+            move |new: DeviceFault| {
                 let mut fault = fault.lock().unwrap_or_else(PoisonError::into_inner);
                 // A loss explains everything else.
-                if fault.is_none() || matches!(new, Fault::Lost(_)) {
+                if fault.is_none() || matches!(new, DeviceFault::Lost(_)) {
                     *fault = Some(new);
                 }
             }
@@ -235,15 +246,16 @@ impl Gpu {
         let (kept, lost) = (keep(&fault), keep(&fault));
         device.on_uncaptured_error(Arc::new(move |error| {
             kept(match error {
-                wgpu::Error::OutOfMemory { .. } => Fault::OutOfMemory,
+                wgpu::Error::OutOfMemory { .. } => DeviceFault::OutOfMemory,
                 wgpu::Error::Validation { description, .. } | wgpu::Error::Internal { description, .. } => {
-                    Fault::Refused(description)
+                    DeviceFault::Refused(description)
                 }
             });
         }));
-        device.set_device_lost_callback(move |reason, message| lost(Fault::Lost(format!("{reason:?}: {message}"))));
+        device
+            .set_device_lost_callback(move |reason, message| lost(DeviceFault::Lost(format!("{reason:?}: {message}"))));
         // Half of the main memory for a device that is the CPU; real ones tell when they have no more.
-        let budget = if description.kind == "CPU" { main_memory() / 2 } else { u64::MAX };
+        let budget = if description.is_software() { main_memory() / 2 } else { u64::MAX };
         let limits = device.limits();
         Ok(Gpu {
             binding: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size),
@@ -271,16 +283,16 @@ impl Gpu {
         let name = &self.adapter.name;
         match fault.clone() {
             None => Ok(()),
-            Some(Fault::Lost(why)) => Err(Error::Lost(format!("{name} was lost ({why})"))),
-            Some(Fault::OutOfMemory) => {
+            Some(DeviceFault::Lost(why)) => Err(Error::Lost(format!("{name} was lost ({why})"))),
+            Some(DeviceFault::OutOfMemory) => {
                 *fault = None;
                 let bytes = self.allocated();
                 Err(Error::Device(format!(
-                    "{name} refused memory that it was asked for, with which {bytes} bytes would be allocated; a smaller \
-                     picture, another device, or \"cpu\", may do"
+                    "{name} has not enough memory for the {bytes} bytes that are needed in all; use a smaller picture, another \
+                     device, or \"cpu\""
                 )))
             }
-            Some(Fault::Refused(what)) => {
+            Some(DeviceFault::Refused(what)) => {
                 *fault = None;
                 Err(Error::Device(format!("{name} refused a call: {what}")))
             }

@@ -179,26 +179,6 @@ impl Grid {
         if self.direction == DMat3::IDENTITY { self.origin + along } else { self.origin + self.direction * along }
     }
 
-    /// The arrays with a value for each point.
-    pub fn point_arrays(&self) -> &[Array] {
-        &self.point_arrays
-    }
-
-    /// The arrays with a value for each cell.
-    pub fn cell_arrays(&self) -> &[Array] {
-        &self.cell_arrays
-    }
-
-    /// What is known of the arrays of points beside their values.
-    pub fn point_attributes(&self) -> &Attributes {
-        &self.point_attributes
-    }
-
-    /// What is known of the arrays of cells beside their values.
-    pub fn cell_attributes(&self) -> &Attributes {
-        &self.cell_attributes
-    }
-
     /// Adds an array with a value for each point.
     ///
     /// # Errors

@@ -13,10 +13,10 @@ use crate::error::{Error, Result};
 use crate::field::Field;
 use crate::gpu::DeviceChoice;
 use crate::image::Image;
-use crate::integral::Choice;
+use crate::integral::IntegrationOptions;
 use crate::mesh::Mesh;
 use crate::mesh::cells::Tetrahedra;
-use crate::project::Switches;
+use crate::project::ProjectionOptions;
 use crate::render::{Renderer, Stats};
 use crate::transfer::TransferFunction;
 use crate::view::View;
@@ -111,16 +111,16 @@ impl Session {
     /// Integrates in another form from now on; as at first, exactly, until this is called.
     ///
     /// # Errors
-    /// [`Error::Render`] if there can be no table of that form. What the form does not read is not judged.
-    pub fn set_integral(&mut self, choice: Choice) -> Result<()> {
+    /// [`Error::Render`] if there can be no table of that form. What the form does not read is not checked.
+    pub fn set_integral(&mut self, choice: IntegrationOptions) -> Result<()> {
         choice.check(choice.size(0))?;
         self.renderer.set_integral(choice);
         Ok(())
     }
 
     /// Draws by another variant of the projection engine from now on; nothing to other engines.
-    pub fn set_switches(&mut self, switches: Switches) {
-        self.renderer.set_switches(switches);
+    pub fn set_projection(&mut self, projection: ProjectionOptions) {
+        self.renderer.set_projection(projection);
     }
 
     /// Rebuilds the fields of regular and rectilinear grids between samples by an order that options know by this name, or
@@ -129,14 +129,13 @@ impl Session {
     /// # Errors
     /// [`Error::Render`] if no order is called so, or the distance is negative or not finite.
     pub fn set_reconstruction(&mut self, order: &str, distance: f64) -> Result<()> {
-        let named = Order::ALL.into_iter().find(|(name, _)| *name == order || order.is_empty());
-        let Some((_, order)) = named else {
-            let known = Order::ALL.map(|(name, _)| name).join(", ");
-            return Err(Error::Render(format!("no reconstruction is called \"{order}\"; there is {known}")));
+        let order = match order {
+            "" => Order::Exact,
+            name => name.parse().map_err(|e| Error::Render(format!("reconstruction: {e}")))?,
         };
         if !(distance >= 0.0 && distance.is_finite()) {
             return Err(Error::Render(format!(
-                "samples {distance} apart: they are 0 or more world units from each other"
+                "the distance of samples is {distance}; it must be 0 or more world units"
             )));
         }
         let sampling = if distance > 0.0 { Sampling::Steps(distance) } else { Sampling::Voxels };

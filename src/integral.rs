@@ -14,24 +14,24 @@
 //! as accurate as f32 can tell; pieces of great optical depth are first cut where nothing more can be seen.
 
 mod batch;
-pub mod choice;
 pub(crate) mod cubic;
 pub(crate) mod floats;
 mod knots;
 pub mod lookup;
+pub mod options;
 pub(crate) mod second;
 pub mod table;
 #[cfg(test)]
 mod tests;
 
 pub use batch::Batch;
-pub use choice::{Choice, Form};
 pub(crate) use knots::BUCKETS;
 pub use knots::Knots;
 pub(crate) use knots::{Line, MOST_OF_PART};
-pub use lookup::{Integral, Lookup};
+pub use lookup::{Integral, PreintegratedTable};
+pub use options::{Form, IntegrationOptions};
 
-use crate::field::{Kind, Normal};
+use crate::field::{Kind, Normalization};
 use crate::real::Real;
 use crate::transfer::{Convention, Emission, TransferFunction};
 use knots::{BRIGHTEST, Curved, Side, Track, chord, compile, extinction, part, sample};
@@ -41,7 +41,7 @@ use knots::{BRIGHTEST, Curved, Side, Track, chord, compile, extinction, part, sa
 pub(crate) const OPAQUE_EXTINCTION: f64 = 1e15;
 
 /// Optical depth beyond which e^{−T} is nothing in f32.
-pub(crate) const DEEP: f64 = 18.0;
+pub(crate) const OPAQUE_DEPTH: f64 = 18.0;
 
 /// Nodes in [0, 1] and weights of the 6-point Gauss–Legendre rule.
 pub(crate) const GAUSS_6: [[f64; 2]; 6] = [
@@ -54,9 +54,9 @@ pub(crate) const GAUSS_6: [[f64; 2]; 6] = [
 ];
 
 /// Optical depth that one panel of 6 nodes covers.
-pub(crate) const PANEL: f64 = 4.0;
-/// Optical depth up to which [`Piece::mild`] holds.
-pub(crate) const MILD: f64 = 1.0;
+pub(crate) const GAUSS_DEPTH: f64 = 4.0;
+/// Optical depth up to which [`Piece::by_series`] holds.
+pub(crate) const SERIES_DEPTH: f64 = 1.0;
 
 /// 1 − e^{−depth}, accurate relative to itself.
 #[inline(always)]
@@ -107,7 +107,7 @@ fn gauss<A: Real, const N: usize>(
 impl<R: Real> Piece<R> {
     const NONE: fn() -> Self = || Piece { alpha: R::of(0.0), front: R::of(0.0), back: R::of(0.0) };
 
-    /// As [`Piece::new`] for depths up to [`MILD`]; takes no decisions, so that a loop over it becomes vector
+    /// As [`Piece::new`] for depths up to [`SERIES_DEPTH`]; takes no decisions, so that a loop over it becomes vector
     /// instructions.
     ///
     /// With the mean depth D = (x + y)/2, δ = y − x and v = u − ½ it is e^{−T(u)} = e^{−D/2} e^{−Dv} e^{δ(¼−v²)/2}. So
@@ -115,7 +115,7 @@ impl<R: Real> Piece<R> {
     /// which converge fast. By parts, ∫ v e^{−T} du = −D (Ψ − e^{−D/2} N₀)/δ and ∫ u T′ e^{−T} du = Ψ − e^{−D}, of
     /// whose terms the ones of N₀ and of q = 1 − e^{−D/2} cancel by hand.
     #[inline(always)]
-    fn mild(x: R, y: R, direct: bool) -> Self {
+    fn by_series(x: R, y: R, direct: bool) -> Self {
         let (one, half, of) = (R::of(1.0), R::of(0.5), R::of);
         let (depth, rise) = ((x + y) * half, y - x);
         let (square, h) = (depth * depth, depth * half);
@@ -139,9 +139,9 @@ impl<R: Real> Piece<R> {
         Piece { alpha, front: alpha - back, back }
     }
 
-    /// As [`Piece::new`] for depths up to [`PANEL`], as [`Self::mild`].
+    /// As [`Piece::new`] for depths up to [`GAUSS_DEPTH`], as [`Self::by_series`].
     #[inline(always)]
-    fn moderate(x: R, y: R, direct: bool) -> Self {
+    fn by_gauss(x: R, y: R, direct: bool) -> Self {
         gauss(&GAUSS_6, x, y, R::of(0.0), R::of(1.0), direct, Self::NONE())
     }
 
@@ -152,16 +152,16 @@ impl<R: Real> Piece<R> {
         let (zero, one) = (R::of(0.0), R::of(1.0));
         let (x, y) = (x.max(zero), y.max(zero));
         let steepest = x.max(y);
-        if steepest <= R::of(MILD) {
-            return Piece::mild(x, y, direct);
+        if steepest <= R::of(SERIES_DEPTH) {
+            return Piece::by_series(x, y, direct);
         }
-        if steepest <= R::of(PANEL) {
-            return Piece::moderate(x, y, direct);
+        if steepest <= R::of(GAUSS_DEPTH) {
+            return Piece::by_gauss(x, y, direct);
         }
-        // Beyond T(u) = DEEP nothing is seen: x u + (y − x) u²/2 = DEEP.
-        let deep = R::of(2.0 * DEEP);
+        // Beyond T(u) = OPAQUE_DEPTH nothing is seen: x u + (y − x) u²/2 = OPAQUE_DEPTH.
+        let deep = R::of(2.0 * OPAQUE_DEPTH);
         let end = if x + y > deep { (deep / (x + (x * x + deep * (y - x)).max(zero).sqrt())).min(one) } else { one };
-        let panels = (x.max(x + (y - x) * end) * end / R::of(PANEL)).truncate() + 1;
+        let panels = (x.max(x + (y - x) * end) * end / R::of(GAUSS_DEPTH)).truncate() + 1;
         let width = end / R::of(f64::from(panels));
         let mut sum = Self::NONE();
         for p in 0..panels {
@@ -177,22 +177,22 @@ pub struct Light<R> {
     /// Premultiplied colour.
     pub color: [R; 3],
     /// Transmittance, in [0, 1].
-    pub through: R,
+    pub transmittance: R,
 }
 
 impl<R: Real> Light<R> {
     /// Nothing gathered yet.
     pub fn none() -> Self {
-        Light { color: [R::of(0.0); 3], through: R::of(1.0) }
+        Light { color: [R::of(0.0); 3], transmittance: R::of(1.0) }
     }
 
     /// Adds something behind: the light that it emits, and its opacity.
     #[inline(always)]
     pub fn add(&mut self, emitted: [R; 3], alpha: R) {
         for (color, emitted) in self.color.iter_mut().zip(emitted) {
-            *color = *color + self.through * emitted;
+            *color = *color + self.transmittance * emitted;
         }
-        self.through = self.through * (R::of(1.0) - alpha);
+        self.transmittance = self.transmittance * (R::of(1.0) - alpha);
     }
 }
 
@@ -216,7 +216,7 @@ pub struct Exact<R> {
 impl<R: Real> Exact<R> {
     /// Prepares `transfer` for a field of `kind` whose components are mapped by `normal`, on a mesh whose coordinates
     /// were multiplied by `scale`.
-    pub fn new(transfer: &TransferFunction, kind: Kind, normal: &[Normal; 4], scale: f64) -> Self {
+    pub fn new(transfer: &TransferFunction, kind: Kind, normal: &[Normalization; 4], scale: f64) -> Self {
         let direct = matches!(transfer.emission(), Emission::Direct { .. });
         let emission = match transfer.emission() {
             Emission::Direct { scale: e } => (e / scale).min(BRIGHTEST),

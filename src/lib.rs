@@ -1,6 +1,22 @@
 //! Halite draws unstructured grids as volumes: every pixel is the emission–absorption integral of the field that the
 //! mesh defines.
 //!
+//! From a file to a picture:
+//!
+//! ```
+//! use halite::{Backdrop, Renderer, Wishes};
+//!
+//! # fn main() -> halite::Result<()> {
+//! # let picture = std::env::temp_dir().join(format!("halite-doc-{}.png", std::process::id()));
+//! let mesh = halite::io::open("cpp/tests/cube.vtu".as_ref(), &|_| ())?;
+//! let mut renderer = Renderer::new(0)?;
+//! let (image, _) = renderer.draw_automatically(&mesh, Wishes::default())?;
+//! image.save(&picture, Backdrop::Transparent)?;
+//! # assert!(image.pixels.iter().any(|p| p[3] > 0.5));
+//! # Ok(std::fs::remove_file(picture).expect("it was written"))
+//! # }
+//! ```
+//!
 //! The pipeline, stage by stage; an arrow never points back:
 //!
 //! 1. [`io::open`] reads a file into a [`mesh::Mesh`]: the grid as it is, validated once; [`io::Source`] also into a
@@ -15,7 +31,7 @@
 //!
 //! [`render::Renderer`] is the whole flow behind one door, [`host::Session`] that door inside another program; with the
 //! feature `ffi` it opens to C++. [`scene`] describes a picture in a JSON file, and
-//! [`mod@reference`] is the slow float64 second opinion that the tests judge the engines by.
+//! [`mod@reference`] is the slow float64 renderer that the tests compare the engines with.
 
 pub mod cast;
 pub mod cell;
@@ -44,4 +60,17 @@ pub mod transfer;
 pub mod traverse;
 pub mod view;
 
+pub use self::image::{Backdrop, Image};
 pub use error::{Error, Result};
+pub use field::Field;
+pub use glam;
+pub use gpu::DeviceChoice;
+pub use grid::Grid;
+pub use integral::IntegrationOptions;
+pub use mesh::Mesh;
+pub use project::ProjectionOptions;
+pub use render::Renderer;
+pub use scene::Scene;
+pub use scene::automatic::Wishes;
+pub use transfer::TransferFunction;
+pub use view::View;

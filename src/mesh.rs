@@ -125,6 +125,28 @@ pub trait Arrays {
 /// Implements [`Arrays`] by methods of the same names.
 macro_rules! has_arrays {
     ($type:ty) => {
+        impl $type {
+            /// The arrays with a value for each point.
+            pub fn point_arrays(&self) -> &[$crate::mesh::Array] {
+                &self.point_arrays
+            }
+
+            /// The arrays with a value for each cell.
+            pub fn cell_arrays(&self) -> &[$crate::mesh::Array] {
+                &self.cell_arrays
+            }
+
+            /// What is known of the arrays of points beside their values.
+            pub fn point_attributes(&self) -> &$crate::mesh::Attributes {
+                &self.point_attributes
+            }
+
+            /// What is known of the arrays of cells beside their values.
+            pub fn cell_attributes(&self) -> &$crate::mesh::Attributes {
+                &self.cell_attributes
+            }
+        }
+
         impl $crate::mesh::Arrays for $type {
             fn cell_count(&self) -> usize {
                 self.cell_count()
@@ -376,26 +398,6 @@ impl Mesh {
     /// The faces of its polyhedra.
     pub fn polyhedra(&self) -> Option<&Polyhedra> {
         self.polyhedra.as_deref()
-    }
-
-    /// The arrays with a value for each point.
-    pub fn point_arrays(&self) -> &[Array] {
-        &self.point_arrays
-    }
-
-    /// The arrays with a value for each cell.
-    pub fn cell_arrays(&self) -> &[Array] {
-        &self.cell_arrays
-    }
-
-    /// What is known of the arrays of points beside their values.
-    pub fn point_attributes(&self) -> &Attributes {
-        &self.point_attributes
-    }
-
-    /// What is known of the arrays of cells beside their values.
-    pub fn cell_attributes(&self) -> &Attributes {
-        &self.cell_attributes
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Shirley & Tuchman's projected tetrahedra (1990) as Kraus, Qiao & Ebert made them right (Projecting Tetrahedra
 //! without Rendering Artifacts, 2004). Its order is that of [`crate::order::mpvo`]; sorted by depth it needs no neighbours, so it also
-//! draws meshes whose topology moves. It is a test bed, in which each published variant can be switched on: [`Switches`] are what differs.
+//! draws meshes whose topology moves. It is a test bed, in which each published variant can be switched on: [`ProjectionOptions`] are what differs.
 
 pub(crate) mod cpu;
 pub(crate) mod gpu;
@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 /// Which variant of the engine draws. The default is the most accurate.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
-pub struct Switches {
+pub struct ProjectionOptions {
     /// Where the values and lengths of a fragment come from.
     pub fragments: Fragments,
     /// How long a ray's way through a cell is; not for [`Fragments::Intersected`].
@@ -31,7 +31,7 @@ pub struct Switches {
     pub compositing: Compositing,
 }
 
-impl Switches {
+impl ProjectionOptions {
     /// Whether the walk may draw pixels of the picture.
     pub(crate) fn walks(&self) -> bool {
         self.cycles == Cycles::Walk && self.compositing == Compositing::Over && self.target == Target::Rgba32float
@@ -141,7 +141,7 @@ pub enum Compositing {
 
 /// What a frame took.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Counts {
+pub(crate) struct ProjectionCounts {
     /// Cells that were drawn.
     pub(crate) cells: u64,
     /// What they were ordered by.
@@ -155,8 +155,7 @@ pub(crate) struct Counts {
     pub(crate) cycle_cells: u64,
     pub(crate) cuts: u64,
     pub(crate) overlapping: u64,
-    /// By the device's own clock, where it has one, or in software the host's: projecting all cells of the order, and
-    /// drawing them.
+    /// By the device's own clock, where it has one: projecting all cells of the order, and drawing them.
     pub(crate) project_ms: Option<f64>,
     pub(crate) draw_ms: Option<f64>,
     /// Fragments that were computed, where the device counts them.

@@ -3,7 +3,7 @@
 use std::fmt::Debug;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// A floating-point number: f32, as the engines compute, or f64, as the tests judge them.
+/// A floating-point number: f32, as the engines compute, or f64, as the tests compare them with.
 pub trait Real:
     Copy
     + Debug

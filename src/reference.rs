@@ -1,4 +1,4 @@
-//! The judge: a slow renderer in f64 that shares no code with the engines, so that no bug can hide in both.
+//! The reference: a slow renderer in f64 that shares no code with the engines, so that no bug can hide in both.
 //!
 //! It tests every tetrahedron (or, of a grid, every voxel: `grid`) against every ray, sorts the intervals by entry, and integrates each piece between two
 //! knots numerically: ∫ c τ exp(−∫τ) by Gauss–Legendre with halving, to about 1e-10.

@@ -1,6 +1,7 @@
 //! The whole flow behind one door: mesh, field, transfer function and view in, image out.
 
 mod answer;
+mod automatic;
 mod backend;
 mod cropped;
 mod frame;
@@ -19,21 +20,21 @@ use crate::cast::Reconstruction;
 pub use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::field::{Field, Kind};
-use crate::geometry::Geometry;
+use crate::geometry::TetMesh;
 use crate::gpu::Part;
 use crate::gpu::table::builds;
 use crate::gpu::{DeviceChoice, Gpu};
 use crate::image::Image;
-use crate::integral::{Choice, Exact, Form, lookup};
+use crate::integral::{Exact, Form, IntegrationOptions, lookup};
 use crate::memory;
 use crate::mesh::Mesh;
 use crate::mesh::cells::Tetrahedra;
-use crate::project::Switches;
+use crate::project::ProjectionOptions;
 use crate::project::cpu::Sweep;
 use crate::transfer::TransferFunction;
 use crate::view::{Blend, View};
 pub use answer::Answer;
-use backend::{Backend, Drawn};
+use backend::{Backend, DrawnFrame};
 use frame::Frame;
 use glam::DVec3;
 use grid::LoadedGrid;
@@ -46,7 +47,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::Instant;
-use tables::{Key, Tables};
+use tables::{TableKey, Tables};
 
 /// The most threads of a renderer: more take minutes to start, and gain nothing.
 pub const MOST_THREADS: usize = 4096;
@@ -58,7 +59,7 @@ pub struct Renderer {
     choice: DeviceChoice,
     engine: Engine,
     backend: Backend,
-    switches: Switches,
+    projection: ProjectionOptions,
     mesh: Option<Loaded>,
     stay: Stay,
     /// The grid that is drawn, in place of a mesh.
@@ -73,10 +74,10 @@ pub struct Renderer {
     sweep: Option<Box<Sweep>>,
     /// The engine that was said to draw neither.
     lacking: Option<&'static str>,
-    integral: Choice,
+    integral: IntegrationOptions,
     tables: Tables,
     /// What of a table is needed, once that is known: none for the exact integral.
-    key: Option<Option<Arc<Key>>>,
+    key: Option<Option<Arc<TableKey>>>,
     /// Whether the next frame waits for its table.
     waits: bool,
     /// The device failed to build a table: others are built on the host.
@@ -128,7 +129,7 @@ impl Renderer {
             choice,
             engine,
             backend,
-            switches: Switches::default(),
+            projection: ProjectionOptions::default(),
             mesh: None,
             stay: Stay::default(),
             grid: None,
@@ -139,7 +140,7 @@ impl Renderer {
             extra: Extra::default(),
             sweep: None,
             lacking: None,
-            integral: Choice::default(),
+            integral: IntegrationOptions::default(),
             tables: Tables::default(),
             key: None,
             waits: true,
@@ -157,30 +158,30 @@ impl Renderer {
     }
 
     /// Takes `part` for changed, wherever it is kept.
-    fn forget(&mut self, part: Part) {
+    fn invalidate(&mut self, part: Part) {
         (self.exact, self.key) = (None, None);
         match part {
-            Part::Function => self.extra.forget_function(),
-            Part::Mesh | Part::Field | Part::Points => self.extra.forget_field(),
+            Part::Function => self.extra.invalidate_function(),
+            Part::Mesh | Part::Field | Part::Points => self.extra.invalidate_field(),
         }
-        self.backend.forget(part);
-        self.backend.forget(Part::Function);
+        self.backend.invalidate(part);
+        self.backend.invalidate(Part::Function);
     }
 
     /// Draws with other variants of the projection engine from now on; nothing to other engines.
-    pub fn set_switches(&mut self, switches: Switches) {
-        self.switches = switches;
+    pub fn set_projection(&mut self, projection: ProjectionOptions) {
+        self.projection = projection;
     }
 
     /// Integrates segments in another form from now on. The next frame waits for its table, if one was named; with
     /// [`Form::Auto`] frames are exact until there is a table.
-    pub fn set_integral(&mut self, integral: Choice) {
+    pub fn set_integral(&mut self, integral: IntegrationOptions) {
         if self.integral != integral {
             self.integral = integral;
             // Values may have to be in the range of tables.
             self.exact = None;
-            self.extra.forget_function();
-            self.grid.iter_mut().for_each(LoadedGrid::forget_function);
+            self.extra.invalidate_function();
+            self.grid.iter_mut().for_each(LoadedGrid::invalidate_function);
             (self.key, self.waits, self.host_builds) = (None, integral.form != Form::Auto, false);
         }
     }
@@ -227,7 +228,7 @@ impl Renderer {
         self.stats.tetrahedra = mesh.tetrahedra.corners.len() as u64;
         self.stats.device_bytes = mesh.geometry.bytes();
         self.field = None;
-        self.forget(Part::Mesh);
+        self.invalidate(Part::Mesh);
         self.mesh = Some(mesh);
         self.name_device();
         self.waits = self.integral.form != Form::Auto;
@@ -258,11 +259,11 @@ impl Renderer {
             return self.connect(points);
         }
         self.name_device();
-        self.extra.forget_field();
-        self.backend.forget(Part::Points);
+        self.extra.invalidate_field();
+        self.backend.invalidate(Part::Points);
         // Extinction counts per normalised length.
         if scaled {
-            self.forget(Part::Function);
+            self.invalidate(Part::Function);
         }
         Ok(())
     }
@@ -295,7 +296,7 @@ impl Renderer {
         let prepared = self.pool.install(|| Prepared::new(mesh, field, transfer, tables))?;
         self.stats.device_bytes = mesh.geometry.bytes() + prepared.values.bytes();
         self.field = Some(prepared);
-        self.forget(Part::Field);
+        self.invalidate(Part::Field);
         self.waits = self.integral.form != Form::Auto;
         self.stats.upload_ms = ms(start);
         Ok(())
@@ -305,9 +306,9 @@ impl Renderer {
     pub fn set_transfer(&mut self, transfer: &TransferFunction) {
         self.transfer = Some(transfer.clone());
         if let Some(grid) = &mut self.grid {
-            grid.forget_function();
+            grid.invalidate_function();
         }
-        self.forget(Part::Function);
+        self.invalidate(Part::Function);
         self.name_device();
     }
 
@@ -339,7 +340,7 @@ impl Renderer {
     /// [`Error::NoMemory`] if there is not.
     pub fn check_room(&self, points: usize, tetrahedra: &Tetrahedra) -> Result<()> {
         let (points, count) = (points + tetrahedra.added.len(), tetrahedra.corners.len());
-        memory::check(&format!("{count} tetrahedra of {points} points"), Geometry::room(points, count))
+        memory::check(&format!("{count} tetrahedra of {points} points"), TetMesh::room(points, count))
     }
 
     /// Normalises the values anew if the transfer function has changed and asks for it.
@@ -353,7 +354,7 @@ impl Renderer {
         let changed = self.pool.install(|| field.fit(mesh, transfer, tables))?;
         field.warn(transfer);
         if changed {
-            self.forget(Part::Field);
+            self.invalidate(Part::Field);
         }
         Ok(())
     }
@@ -404,7 +405,7 @@ impl Renderer {
                     let exact = Exact::new(transfer, kind, normal, geometry.scale);
                     // Devices build colours, and no weights of such.
                     let on_device = on_device && kind == Kind::Scalar;
-                    Arc::new(Key { exact, choice, longest, on_device })
+                    Arc::new(TableKey { exact, choice, longest, on_device })
                 });
                 self.key.insert(key)
             }
@@ -416,7 +417,7 @@ impl Renderer {
         };
         if let (Some(key), Some(built)) = (key, built.as_ref().filter(|b| b.table.source().is_some())) {
             let asked = Instant::now();
-            match self.backend.hold(exact, &built.table, self.waits) {
+            match self.backend.ensure_resident(exact, &built.table, self.waits) {
                 Err(e @ Error::Lost(_)) => return Err(e),
                 Err(e) => {
                     tracing::warn!("{e}; building the table on the CPU");
@@ -430,14 +431,14 @@ impl Renderer {
         let late = key.as_ref().filter(|_| view.blend() == Blend::Composite && built.is_none()).cloned();
         let (mesh, table) = (&*mesh, built.as_ref().map(|b| &b.table));
         self.waits = false;
-        self.stats.integral = table.map_or(Form::Exact, |t| t.choice().form).name().into();
+        self.stats.integral = table.map_or(Form::Exact, |t| t.options().form).name().into();
         self.stats.table_ms = built.as_ref().map_or(0.0, |b| b.ms);
-        self.stats.table_bytes = table.map_or(0, |t| Choice::bytes(t.size()));
+        self.stats.table_bytes = table.map_or(0, |t| IntegrationOptions::bytes(t.size()));
         // What draws by itself is exact: variants are for those who ask for the projection.
-        let none = Switches::default();
-        let switches = if self.engine == Engine::Auto { &none } else { &self.switches };
+        let none = ProjectionOptions::default();
+        let projection = if self.engine == Engine::Auto { &none } else { &self.projection };
         let as_values = self.as_values;
-        let frame = Frame { mesh, field, transfer, exact, table, view, switches, as_values, progress };
+        let frame = Frame { mesh, field, transfer, exact, table, view, projection, as_values, progress };
         let uploaded = self.backend.gpu().map_or(0, Gpu::uploaded);
         let mut walk = Backend::Walk;
         let backend = if mesh.left_to_walk { &mut walk } else { &mut self.backend };
@@ -450,10 +451,10 @@ impl Renderer {
             self.stats.uploaded_bytes = gpu.uploaded() - uploaded;
             self.stats.device_bytes = gpu.allocated();
         }
-        let Drawn { pixels, counts, device_ms, projection, sweep } = drawn;
+        let DrawnFrame { pixels, counts, device_ms, projection, sweep } = drawn;
         self.stats.device_ms = device_ms;
         self.stats.steps = counts.steps;
-        self.stats.repaired_rays = counts.repaired;
+        self.stats.retraced_rays = counts.retraced;
         (self.stats.cpu_rays, self.stats.panels, self.stats.culled_cells) = (counts.unfinished, 0, 0);
         (self.stats.projection, self.stats.sweep) = (projection, sweep);
         self.stats.frame_ms = ms(start);

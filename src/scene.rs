@@ -27,7 +27,7 @@ use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::field::{Association, Component, Field};
 use crate::grid::Grid;
-use crate::integral::Choice;
+use crate::integral::IntegrationOptions;
 use crate::memory;
 use crate::mesh::{Array, Arrays};
 use crate::transfer::TransferFunction;
@@ -75,7 +75,7 @@ pub struct Scene {
     pub integral: Option<Value>,
     /// How fields of regular and rectilinear grids are rebuilt along rays.
     pub reconstruction: Option<Reconstruction>,
-    /// The projection engine's switches.
+    /// The projection engine's options.
     pub projection: Option<Value>,
 }
 
@@ -254,11 +254,11 @@ pub fn behind_volume(view: View, opaque: &[Opaque], background: [f32; 3]) -> Res
 ///
 /// # Errors
 /// What is wrong, and where in the value.
-pub fn integral(value: &Value) -> std::result::Result<Choice, String> {
+pub fn integral(value: &Value) -> std::result::Result<IntegrationOptions, String> {
     if let Value::String(name) = value {
-        return Choice::default().named(name);
+        return IntegrationOptions::default().named(name);
     }
-    let choice: Choice = read(value)?;
+    let choice: IntegrationOptions = read(value)?;
     choice.two.check().map_err(|what| format!("two: {what}"))?;
     Ok(choice)
 }

@@ -1,11 +1,7 @@
 //! What the README says about accuracy: pictures by the engine against the reference's, on every kind of mesh that can
 //! be generated. `cargo test --release --test accuracy -- --nocapture` prints the figures.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::print_stdout,
-    reason = "a test fails by panicking, and this one has figures to show"
-)]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests fail by panicking")]
 
 use glam::DVec3;
 use halite::field::{Association, Component, Field};

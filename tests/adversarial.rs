@@ -8,7 +8,7 @@ use common::draw::{self, MESHES, Random};
 use common::{ENGINES, Engine, Scene, rounds};
 use glam::{DMat3, DQuat, DVec3, dvec2, dvec3};
 use halite::field::Association;
-use halite::geometry::Geometry;
+use halite::geometry::TetMesh;
 use halite::geometry::contacts::Contacts;
 use halite::gpu::DeviceChoice;
 use halite::image::Image;
@@ -100,7 +100,7 @@ fn overlaps(mesh: &Mesh) -> usize {
     let faces = Faces::new(&points, &tetrahedra.corners);
     let turned = faces.orientation.iter().filter(|o| **o < 0).count();
     let turned = turned.min(faces.orientation.len() - turned);
-    turned + faces.folded + Contacts::new(&Geometry::new(&points, &tetrahedra, &faces)).overlapping
+    turned + faces.folded + Contacts::new(&TetMesh::new(&points, &tetrahedra, &faces)).overlapping
 }
 
 /// Pictures by all engines: the CPU's, and for some that of the device `HALITE_TEST_DEVICE`, or the first, if there is

@@ -197,7 +197,7 @@ fn devices_lose_nothing_either() {
     report.finish("devices");
 }
 
-/// The judge is held to the same: what it says of rays in faces is no guess.
+/// The reference is held to the same: what it says of rays in faces is no guess.
 #[test]
 fn the_judge_loses_nothing_either() {
     let mut report = Report::default();
@@ -206,5 +206,5 @@ fn the_judge_loses_nothing_either() {
         let some: Vec<_> = parallel.iter().chain(&fans).step_by(7).cloned().collect();
         hold(&mut report, &[Engine::Reference], name, (&scene, half), &some);
     }
-    report.finish("judge");
+    report.finish("reference");
 }

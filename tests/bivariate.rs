@@ -1,12 +1,6 @@
 //! Functions of two variables, light and silhouettes: pictures against the reference's, on meshes of every kind of cell.
 
-#![allow(
-    clippy::expect_used,
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::print_stderr,
-    reason = "a test fails by panicking, and tells what it measured"
-)]
+#![allow(clippy::expect_used, clippy::unwrap_used, clippy::panic, clippy::print_stderr, reason = "tests")]
 
 mod common;
 
@@ -160,7 +154,7 @@ fn functions() -> Vec<(&'static str, TransferFunction)> {
     ]
 }
 
-/// Some pixels of each picture: the judge is slow.
+/// Some pixels of each picture: the reference is slow.
 #[test]
 fn pictures_are_the_references() {
     let mut report = Report::default();

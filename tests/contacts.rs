@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use glam::{DVec3, dvec3};
-use halite::geometry::Geometry;
+use halite::geometry::TetMesh;
 use halite::geometry::contacts::Contacts;
 use halite::mesh::cells::Tetrahedra;
 use halite::mesh::faces::Faces;
@@ -14,7 +14,7 @@ fn contacts(mesh: &Mesh) -> [usize; 3] {
     let tetrahedra = Tetrahedra::new(mesh).unwrap();
     let points = tetrahedra.points(mesh.points());
     let faces = Faces::new(&points, &tetrahedra.corners);
-    let found = Contacts::new(&Geometry::new(&points, &tetrahedra, &faces));
+    let found = Contacts::new(&TetMesh::new(&points, &tetrahedra, &faces));
     assert_eq!(found.faces, faces.boundary.len());
     [found.faces, found.touching, found.overlapping]
 }

@@ -1,19 +1,13 @@
 //! Visibility orders against a checker that asks each pixel's ray.
 
-#![allow(
-    clippy::expect_used,
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::print_stderr,
-    reason = "a test fails by panicking, and tells what it measured"
-)]
+#![allow(clippy::expect_used, clippy::unwrap_used, clippy::panic, clippy::print_stderr, reason = "tests")]
 
 mod common;
 
 use common::draw::{self, Random};
 use common::{rounds, shared};
 use glam::{DMat3, DVec3, dvec3};
-use halite::geometry::Geometry;
+use halite::geometry::TetMesh;
 use halite::mesh::cells::Tetrahedra;
 use halite::mesh::faces::Faces;
 use halite::mesh::{Mesh, generate};
@@ -22,15 +16,15 @@ use halite::order::mpvo::{Mpvo, Rule, Sequence};
 use halite::view::{Camera, Projection, View};
 use robust::Coord3D;
 
-fn geometry(mesh: &Mesh) -> Geometry {
+fn geometry(mesh: &Mesh) -> TetMesh {
     geometry_of(mesh).unwrap()
 }
 
 /// The geometry of a mesh that can be split into tetrahedra.
-fn geometry_of(mesh: &Mesh) -> Option<Geometry> {
+fn geometry_of(mesh: &Mesh) -> Option<TetMesh> {
     let tetrahedra = Tetrahedra::new(mesh).ok()?;
     let points = tetrahedra.points(mesh.points());
-    Some(Geometry::new(&points, &tetrahedra, &Faces::new(&points, &tetrahedra.corners)))
+    Some(TetMesh::new(&points, &tetrahedra, &Faces::new(&points, &tetrahedra.corners)))
 }
 
 /// A mesh of these tetrahedra.
@@ -38,7 +32,7 @@ fn mesh_of(points: Vec<DVec3>, cells: &[[u32; 4]]) -> Mesh {
     draw::mesh_of(points, cells.iter().map(|c| (10, &c[..])))
 }
 
-fn judged(geometry: &Geometry, view: &View, rule: Rule) -> (Sequence, Verdict) {
+fn checked(geometry: &TetMesh, view: &View, rule: Rule) -> (Sequence, Verdict) {
     let sequence = Mpvo::default().sequence(geometry, view, rule);
     let entries: Vec<u32> = sequence.cells.iter().rev().copied().collect();
     let mut all = entries.clone();
@@ -163,8 +157,8 @@ fn a_thousand_meshes_are_in_order() {
         let mut random = Random::of(&format!("{kind} {i}"));
         let geometry = geometry(&drawn(kind, &mut random));
         let view = seen(i, &mut random);
-        let (sequence, verdict) = judged(&geometry, &view, Rule::Mpvo);
-        tally.add(&sequence, &verdict, &judged(&geometry, &view, Rule::Depth).1);
+        let (sequence, verdict) = checked(&geometry, &view, Rule::Mpvo);
+        tally.add(&sequence, &verdict, &checked(&geometry, &view, Rule::Depth).1);
         assert_eq!(verdict.overlaps, 0, "{kind} {i}");
         assert_eq!((sequence.cycles > 0, sequence.cuts > 0), (sequence.cycle_cells > 0, sequence.cycles > 0));
         assert!(sequence.cycles > 0 || verdict.inversions == 0, "{kind} {i}: {verdict:?}");
@@ -239,7 +233,7 @@ fn rings_are_circles() {
         for (name, mesh) in [("beams", generate::ring(n))].into_iter().chain(blades) {
             let geometry = geometry(&mesh);
             for from in [dvec3(0.01, 0.02, 4.0), dvec3(0.0, 0.05, -4.0)] {
-                let (sequence, verdict) = judged(&geometry, &view(from, [96, 96]), Rule::Mpvo);
+                let (sequence, verdict) = checked(&geometry, &view(from, [96, 96]), Rule::Mpvo);
                 assert_eq!(sequence.cycles, 1, "{name} {n}: {sequence:?}");
                 assert!(sequence.cycle_cells >= n as u64 && sequence.cuts >= 1, "{name} {n}: {sequence:?}");
                 // Between blades there may be a face that no pixel sees.
@@ -252,7 +246,7 @@ fn rings_are_circles() {
                 let share = sequence.disordered.len() as f64 / verdict.pixels as f64;
                 assert!(share < 2.0 / n as f64, "{name} {n}: {share}");
             }
-            let (sequence, verdict) = judged(&geometry, &view(dvec3(4.0, 0.3, 0.2), [96, 96]), Rule::Mpvo);
+            let (sequence, verdict) = checked(&geometry, &view(dvec3(4.0, 0.3, 0.2), [96, 96]), Rule::Mpvo);
             assert_eq!((sequence.cycles, verdict.inversions), (0, 0), "{name} {n} from aside");
         }
     }
@@ -273,13 +267,13 @@ fn every_twisted_ring_is_found() {
         let position = turn * dvec3(random.within(-0.05, 0.05), random.within(-0.05, 0.05), 4.0 * side);
         let projection = Projection::Perspective { view_angle: 35.0 };
         let camera = Camera { position, focal_point: DVec3::ZERO, view_up: turn * DVec3::Y, projection };
-        let (sequence, verdict) = judged(&geometry, &View::new(camera, [96, 96]).unwrap(), Rule::Mpvo);
+        let (sequence, verdict) = checked(&geometry, &View::new(camera, [96, 96]).unwrap(), Rule::Mpvo);
         found += usize::from(sequence.cycles == 1 && sequence.cycle_cells >= n as u64);
         // A circle that any pixel sees has a wrong pair in whatever order: without one that is found there is none.
         assert!(sequence.cycles > 0 || verdict.inversions == 0, "{i}: {n} blades, twist {twist}");
         let told = |p: &u32| sequence.disordered.binary_search(p).is_ok();
         assert!(verdict.overlaps == 0 && verdict.wrong.iter().all(told), "{i}: {n} blades, {sequence:?}");
-        tally.add(&sequence, &verdict, &judged(&geometry, &View::new(camera, [96, 96]).unwrap(), Rule::Depth).1);
+        tally.add(&sequence, &verdict, &checked(&geometry, &View::new(camera, [96, 96]).unwrap(), Rule::Depth).1);
     }
     eprintln!("a circle is found in {found} of 200 rings; {tally}");
     assert_eq!(found, 200);
@@ -295,10 +289,10 @@ fn published_orders_are_right_where_they_say() {
     for i in 0..20 {
         let view = seen(3 * i + 1, &mut random);
         for rule in [Rule::Convex, Rule::Nonconvex, Rule::Xmpvo] {
-            assert_eq!(judged(&convex, &view, rule).1.inversions, 0, "{rule:?}");
+            assert_eq!(checked(&convex, &view, rule).1.inversions, 0, "{rule:?}");
         }
         for (count, rule) in wrong.iter_mut().zip([Rule::Convex, Rule::Nonconvex, Rule::Xmpvo]) {
-            *count += judged(&islands, &view, rule).1.wrong.len();
+            *count += checked(&islands, &view, rule).1.wrong.len();
         }
     }
     eprintln!("pixels wrong of islands: MPVO {}, MPVONC {}, XMPVO {}", wrong[0], wrong[1], wrong[2]);
@@ -361,8 +355,8 @@ fn meshes_of_others_are_in_order() {
         let position = geometry.centre + random.direction() * (3.0 * radius);
         let camera = Camera { position, focal_point: geometry.centre, view_up: random.direction(), projection };
         let view = View::new(camera, [64, 64]).unwrap();
-        let (sequence, verdict) = judged(&geometry, &view, Rule::Mpvo);
-        let depth = judged(&geometry, &view, Rule::Depth).1;
+        let (sequence, verdict) = checked(&geometry, &view, Rule::Mpvo);
+        let depth = checked(&geometry, &view, Rule::Depth).1;
         eprintln!(
             "{name}: {} cells, {} pairs, {} inverted, {} overlap; by depth {} inverted, {} of {} pixels wrong; {} cycles, {} pixels \
              see a cut",

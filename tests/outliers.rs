@@ -1,13 +1,7 @@
 //! Values that are far from all others, as fill values are, and functions whose knots are far nearer to each other than
 //! values are: what such do to a picture is what the reference says, and nothing else.
 
-#![allow(
-    clippy::expect_used,
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::print_stderr,
-    reason = "a test fails by panicking, and tells what it measured"
-)]
+#![allow(clippy::expect_used, clippy::unwrap_used, clippy::panic, clippy::print_stderr, reason = "tests")]
 
 mod common;
 
@@ -17,7 +11,7 @@ use glam::{DMat3, DVec3, dvec3};
 use halite::field::{Association, Component, Field};
 use halite::host::Log;
 use halite::image::Image;
-use halite::integral::choice::{Choice, Form};
+use halite::integral::options::{Form, IntegrationOptions};
 use halite::mesh::cells::Tetrahedra;
 use halite::mesh::{Array, Mesh, Values, generate};
 use halite::render::{self, Renderer};
@@ -140,7 +134,7 @@ fn tables_are_for_what_the_function_tells() {
         for form in [Form::Volume, Form::Polynomial, Form::Cylindrical] {
             let errors = [&scene, &outliers].map(|scene| {
                 let expected = Engine::Reference.image(scene, &view(Blend::Composite));
-                renderer.set_integral(Choice::of(form));
+                renderer.set_integral(IntegrationOptions::of(form));
                 set(&mut renderer, scene);
                 renderer.render(&view(Blend::Composite), &|_| ()).unwrap().compare(&expected).unwrap().max
             });
@@ -191,8 +185,8 @@ fn knots_may_be_anywhere() {
     let mut report = Report::default();
     for (case, scene) in scenes {
         let view = view(Blend::Composite);
-        let judged = if case == "a tiny range" { &plain } else { &scene };
-        let expected = Engine::Reference.image(judged, &view);
+        let compared = if case == "a tiny range" { &plain } else { &scene };
+        let expected = Engine::Reference.image(compared, &view);
         assert!(expected.pixels.iter().any(|p| p[3] > 0.01), "{case}: there is something to see");
         for engine in ENGINES {
             report.hold(&format!("{engine:?}, {case}"), &engine.image(&scene, &view), &expected, BOUND);

@@ -1,12 +1,6 @@
-//! The projection engine against the judge, and each of its published faults against its cure.
+//! The projection engine against the reference, and each of its published faults against its cure.
 
-#![allow(
-    clippy::expect_used,
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::print_stderr,
-    reason = "a test fails by panicking, and tells what it measured"
-)]
+#![allow(clippy::expect_used, clippy::unwrap_used, clippy::panic, clippy::print_stderr, reason = "tests")]
 
 mod common;
 
@@ -15,10 +9,10 @@ use common::{Engine, Report, Scene, rounds, set};
 use glam::{DVec3, dvec3};
 use halite::field::Association;
 use halite::image::Image;
-use halite::integral::choice::{Choice, Form, Texels};
+use halite::integral::options::{Form, IntegrationOptions, Texels};
 use halite::integral::table::Kind;
 use halite::mesh::{Array, Mesh, Values, generate};
-use halite::project::{Compositing, Cycles, Fragments, Order, Switches, Target, Thickness};
+use halite::project::{Compositing, Cycles, Fragments, Order, ProjectionOptions, Target, Thickness};
 use halite::render::{self, Renderer};
 use halite::transfer::{Convention, Emission, TransferFunction};
 use halite::view::{Blend, Camera, Projection, View};
@@ -27,8 +21,8 @@ fn renderer() -> Option<Renderer> {
     common::on_device(render::Engine::Project)
 }
 
-fn image(renderer: &mut Renderer, switches: Switches, view: &View) -> Image {
-    renderer.set_switches(switches);
+fn image(renderer: &mut Renderer, options: ProjectionOptions, view: &View) -> Image {
+    renderer.set_projection(options);
     renderer.render(view, &|_| ()).unwrap()
 }
 
@@ -60,7 +54,7 @@ fn every_mesh_is_drawn_as_it_is() {
                 for (blend, report) in [(Blend::Composite, &mut report), (Blend::Maximum, &mut largest)] {
                     let view = view.clone().with_blend(blend);
                     let expected = Engine::Reference.image(&scene, &view);
-                    let got = image(&mut renderer, Switches::default(), &view);
+                    let got = image(&mut renderer, ProjectionOptions::default(), &view);
                     report.hold(&case, &got, &expected, 5e-5);
                     walked += renderer.stats().projection.map_or(0, |p| p.walked_pixels);
                 }
@@ -114,7 +108,7 @@ fn one_cell_is_exact() {
                     .push(View::new(Camera { projection: parallel, ..*views[1].camera().unwrap() }, [72, 64]).unwrap());
                 for (i, view) in views.iter().enumerate() {
                     let expected = Engine::Reference.image(&scene, view);
-                    let got = image(&mut renderer, Switches::default(), view);
+                    let got = image(&mut renderer, ProjectionOptions::default(), view);
                     // What f32 tells of lengths.
                     report.hold(&format!("{case}, view {i}"), &got, &expected, 2e-6 + 4e-7 * depth);
                 }
@@ -139,7 +133,7 @@ fn constants_are_opaque_as_single_values() {
         set(&mut renderer, &scene);
         let view = perspective(dvec3(0.4, 0.3, 4.0), 60.0);
         let expected = Engine::Twin { threads: 2 }.image(&scene, &view);
-        let got = image(&mut renderer, Switches::default(), &view);
+        let got = image(&mut renderer, ProjectionOptions::default(), &view);
         assert_eq!(got.pixels.iter().any(|p| p[3] > 0.999), is_opaque, "{value}");
         report.hold(&format!("constant {value}"), &got, &expected, 2e-6);
     }
@@ -217,8 +211,8 @@ fn holes() -> (Scene, View) {
     (scene, perspective(dvec3(2.5, 1.5, 4.0), 35.0))
 }
 
-/// The error of `fault` and of `cure` in a scene, against the judge.
-fn errors<const N: usize>((scene, view): &(Scene, View), variants: [Switches; N]) -> Option<[f64; N]> {
+/// The error of `fault` and of `cure` in a scene, against the reference.
+fn errors<const N: usize>((scene, view): &(Scene, View), variants: [ProjectionOptions; N]) -> Option<[f64; N]> {
     let mut renderer = renderer()?;
     set(&mut renderer, scene);
     let expected = Engine::Reference.image(scene, view);
@@ -227,8 +221,8 @@ fn errors<const N: usize>((scene, view): &(Scene, View), variants: [Switches; N]
 
 #[test]
 fn perspective_interpolation_cures_linear() {
-    let form = |fragments| Switches { fragments, ..Switches::default() };
-    let by_depth = Switches { thickness: Thickness::Depth, ..form(INTERPOLATED) };
+    let form = |fragments| ProjectionOptions { fragments, ..ProjectionOptions::default() };
+    let by_depth = ProjectionOptions { thickness: Thickness::Depth, ..form(INTERPOLATED) };
     let variants = [form(Fragments::Linear), by_depth, form(INTERPOLATED), form(Fragments::Intersected)];
     let Some([linear, by_depth, interpolated, intersected]) = errors(&peak(), variants) else { return };
     eprintln!(
@@ -238,19 +232,19 @@ fn perspective_interpolation_cures_linear() {
     assert!(interpolated < 5e-4 && intersected < 1e-5);
 }
 
-/// The errors of tables of three parameters in a scene, against the judge.
-fn table_errors<const N: usize>((scene, view): &(Scene, View), volumes: [Choice; N]) -> Option<[f64; N]> {
+/// The errors of tables of three parameters in a scene, against the reference.
+fn table_errors<const N: usize>((scene, view): &(Scene, View), volumes: [IntegrationOptions; N]) -> Option<[f64; N]> {
     let mut renderer = renderer()?;
     set(&mut renderer, scene);
     let expected = Engine::Reference.image(scene, view);
     Some(volumes.map(|choice| {
         renderer.set_integral(choice);
-        rmse(&image(&mut renderer, Switches::default(), view), &expected)
+        rmse(&image(&mut renderer, ProjectionOptions::default(), view), &expected)
     }))
 }
 
-fn volume(lengths: Kind, texels: Texels, table: [u32; 3]) -> Choice {
-    Choice { lengths, texels, table: Some(table), ..Choice::of(Form::Volume) }
+fn volume(lengths: Kind, texels: Texels, table: [u32; 3]) -> IntegrationOptions {
+    IntegrationOptions { lengths, texels, table: Some(table), ..IntegrationOptions::of(Form::Volume) }
 }
 
 #[test]
@@ -282,20 +276,20 @@ fn floats_and_dithering_cure_8_bits() {
     let (scene, view) = faint();
     set(&mut renderer, &scene);
     let expected = Engine::Reference.image(&scene, &view);
-    let eight = Switches { target: Target::Rgba8, ..Switches::default() };
+    let eight = ProjectionOptions { target: Target::Rgba8, ..ProjectionOptions::default() };
     let variants = [
         eight,
-        Switches { dither: true, ..eight },
-        Switches { target: Target::Rgba16float, ..eight },
-        Switches::default(),
+        ProjectionOptions { dither: true, ..eight },
+        ProjectionOptions { target: Target::Rgba16float, ..eight },
+        ProjectionOptions::default(),
     ];
     let [plain, dithered, half, float] =
         variants.map(|s| rmse(&blurred(&image(&mut renderer, s, &view)), &blurred(&expected)));
     eprintln!("8 bits {plain:.1e}, dithered {dithered:.1e}, 16-bit floats {half:.1e}, floats {float:.1e}");
     assert!(plain > 3.0 * dithered && plain > 10.0 * half && half > 5.0 * float && float < 1e-5);
     // Cells that only add up dither their colours.
-    let additive = |s| Switches { compositing: Compositing::Additive, ..s };
-    let [sum, plain, dithered] = [Switches::default(), eight, Switches { dither: true, ..eight }]
+    let additive = |s| ProjectionOptions { compositing: Compositing::Additive, ..s };
+    let [sum, plain, dithered] = [ProjectionOptions::default(), eight, ProjectionOptions { dither: true, ..eight }]
         .map(|s| blurred(&colours(image(&mut renderer, additive(s), &view))));
     let [plain, dithered] = [plain, dithered].map(|i| rmse(&i, &sum));
     eprintln!("additive: 8 bits {plain:.1e}, dithered {dithered:.1e}");
@@ -324,7 +318,7 @@ fn blurred(image: &Image) -> Image {
 
 #[test]
 fn orders_cure_one_another() {
-    let order = |order| Switches { order, ..Switches::default() };
+    let order = |order| ProjectionOptions { order, ..ProjectionOptions::default() };
     let variants = [Order::None, Order::MpvoConvex, Order::Mpvonc, Order::Depth, Order::Xmpvo, Order::Mpvo].map(order);
     let Some([none, convex, nonconvex, depth, xmpvo, mpvo]) = errors(&holes(), variants) else { return };
     eprintln!(
@@ -347,8 +341,10 @@ fn circles_are_left_to_the_walk() {
     let view = perspective(dvec3(0.01, 0.02, 4.0), 35.0);
     let expected = Engine::Reference.image(&scene, &view);
     let [cut, walked] = [Cycles::Cut, Cycles::Walk].map(|cycles| {
-        let max =
-            image(&mut renderer, Switches { cycles, ..Switches::default() }, &view).compare(&expected).unwrap().max;
+        let max = image(&mut renderer, ProjectionOptions { cycles, ..ProjectionOptions::default() }, &view)
+            .compare(&expected)
+            .unwrap()
+            .max;
         (max, renderer.stats().projection.unwrap())
     });
     assert_eq!((cut.1.cycles, cut.1.walked_pixels, walked.1.cycles), (1, 0, 1));
@@ -365,11 +361,11 @@ fn a_mesh_that_changes_with_each_frame_is_drawn_by_depth() {
     let log = halite::host::Log::default();
     for wanted in [(Order::Mpvo, 0), (Order::Mpvo, 0), (Order::Depth, 1), (Order::Depth, 0)] {
         set(&mut renderer, &scene);
-        log.collect(|| image(&mut renderer, Switches::default(), &view));
+        log.collect(|| image(&mut renderer, ProjectionOptions::default(), &view));
         let said = log.take().iter().filter(|line| line.contains("in the order of their depths")).count();
         assert_eq!((order(&renderer), said), wanted);
     }
-    let still = image(&mut renderer, Switches::default(), &view);
+    let still = image(&mut renderer, ProjectionOptions::default(), &view);
     assert_eq!(order(&renderer), Order::Mpvo);
     assert!(still.compare(&Engine::Reference.image(&scene, &view)).unwrap().max < 2e-5);
 }
@@ -380,15 +376,15 @@ fn a_still_camera_keeps_its_order() {
     let (scene, view) = holes();
     set(&mut renderer, &scene);
     let sorts = |r: &Renderer| r.stats().projection.unwrap().sorts;
-    let first = image(&mut renderer, Switches::default(), &view);
+    let first = image(&mut renderer, ProjectionOptions::default(), &view);
     assert_eq!(sorts(&renderer), 1);
-    assert!(image(&mut renderer, Switches::default(), &view) == first);
+    assert!(image(&mut renderer, ProjectionOptions::default(), &view) == first);
     assert_eq!(sorts(&renderer), 0);
-    image(&mut renderer, Switches::default(), &perspective(dvec3(-2.5, 1.5, 4.0), 35.0));
+    image(&mut renderer, ProjectionOptions::default(), &perspective(dvec3(-2.5, 1.5, 4.0), 35.0));
     assert_eq!(sorts(&renderer), 1);
     // Another function may show other cells.
     renderer.set_transfer(&TransferFunction::new(vec![(0.0, [1.0; 3])], vec![(0.0, 0.0)], 1.0).unwrap());
-    let empty = image(&mut renderer, Switches::default(), &view);
+    let empty = image(&mut renderer, ProjectionOptions::default(), &view);
     assert!(empty.pixels.iter().all(|p| *p == [0.0; 4]));
     assert_eq!(renderer.stats().projection.unwrap().drawn_cells, 0);
 }
@@ -400,7 +396,7 @@ fn cells_that_are_not_seen_are_not_sorted() {
     set(&mut renderer, &scene);
     // A view of a corner, from inside.
     let view = perspective(dvec3(0.5, 0.5, 0.5), 20.0);
-    image(&mut renderer, Switches::default(), &view);
+    image(&mut renderer, ProjectionOptions::default(), &view);
     let drawn = renderer.stats().projection.unwrap().drawn_cells;
     assert!(drawn > 0 && drawn < scene.mesh.cells().len() as u64 / 3, "{drawn} of {}", scene.mesh.cells().len());
 }
@@ -413,8 +409,8 @@ fn what_it_cannot_draw_it_says() {
     renderer.set_integral(volume(Kind::Log, Texels::Float, [1, 1, 1]));
     let table = renderer.render(&view, &|_| ()).unwrap_err();
     assert!(table.to_string().contains("table"), "{table}");
-    renderer.set_integral(Choice::default());
-    assert!(image(&mut renderer, Switches::default(), &view).pixels.iter().any(|p| p[3] > 0.1));
+    renderer.set_integral(IntegrationOptions::default());
+    assert!(image(&mut renderer, ProjectionOptions::default(), &view).pixels.iter().any(|p| p[3] > 0.1));
 }
 
 /// A wedge of cells around the eye: some hold it, some are beside and behind it.
@@ -427,7 +423,7 @@ fn cells_that_hold_the_eye_are_clipped_not_dropped() {
     });
     for (at, bound) in [(dvec3(0.13, 0.21, 0.33), 1e-3), (dvec3(-0.4, 0.33, 0.9), 1e-3)] {
         let view = perspective(at, 100.0);
-        let form = |fragments| Switches { fragments, ..Switches::default() };
+        let form = |fragments| ProjectionOptions { fragments, ..ProjectionOptions::default() };
         let Some([interpolated, intersected]) =
             errors(&(scene.clone(), view), [form(INTERPOLATED), form(Fragments::Intersected)])
         else {
@@ -467,8 +463,8 @@ fn parts_of_a_cell_are_drawn_from_back_to_front() {
         let view = if i % 3 == 0 { view.with_clipping_range([0.15, 10.0]).unwrap() } else { view };
         let expected = Engine::Reference.image(&scene, &view);
         set(&mut renderer, &scene);
-        let switches = Switches { fragments: INTERPOLATED, ..Switches::default() };
-        report.hold(&format!("cell {i}"), &image(&mut renderer, switches, &view), &expected, 2e-3);
+        let options = ProjectionOptions { fragments: INTERPOLATED, ..ProjectionOptions::default() };
+        report.hold(&format!("cell {i}"), &image(&mut renderer, options, &view), &expected, 2e-3);
     }
     report.finish("parts of a cell");
 }
@@ -489,10 +485,10 @@ fn parallel_views_with_a_clipping_range_draw_cells_once() {
     let part = all.clone().with_clipping_range([3.0, 5.4]).unwrap();
     let expected = Engine::Reference.image(&scene, &part);
     for fragments in [INTERPOLATED, Fragments::Linear, Fragments::Intersected] {
-        let switches = Switches { fragments, ..Switches::default() };
-        image(&mut renderer, switches, &all);
+        let options = ProjectionOptions { fragments, ..ProjectionOptions::default() };
+        image(&mut renderer, options, &all);
         let whole = renderer.stats().projection.unwrap().drawn_cells;
-        let error = image(&mut renderer, switches, &part).compare(&expected).unwrap();
+        let error = image(&mut renderer, options, &part).compare(&expected).unwrap();
         let drawn = renderer.stats().projection.unwrap().drawn_cells;
         eprintln!("{fragments:?}: {drawn} of {whole} cells, rmse {:.1e}, max {:.1e}", error.rmse, error.max);
         assert!(drawn <= whole && error.rmse < 2e-3);

@@ -1,4 +1,4 @@
-//! The judge is judged by closed forms.
+//! The reference against closed forms.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 

@@ -1,13 +1,7 @@
 //! The scenes of `../shared/reference`, whose images another program drew in f64: where that folder is not, the meshes
 //! of the other tests stand alone.
 
-#![allow(
-    clippy::expect_used,
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::print_stderr,
-    reason = "a test fails by panicking"
-)]
+#![allow(clippy::expect_used, clippy::unwrap_used, clippy::panic, clippy::print_stderr, reason = "tests")]
 
 mod common;
 
@@ -28,8 +22,8 @@ const SHARP: [(&str, f64); 3] = [("bivariate_opacity", 1e-4), ("light_inside90",
 /// Scenes of work that is not done: curved cells as they are, regular grids.
 const LATER: [&str; 5] = ["curved_", "rectilinear_", "regular_", "structured_annulus", "structured_terrain"];
 
-/// Scenes of few cells, in which the judge is judged: each a different feature.
-const JUDGED: [&str; 18] = [
+/// Scenes of few cells, in which the reference itself is checked: each a different feature.
+const CHECKED: [&str; 18] = [
     "bivariate_oblique",
     "bivariate_sinusoid_direct",
     "coarse_bands",
@@ -96,28 +90,28 @@ fn the_engines_draw_what_the_oracle_drew() {
     }
 }
 
-/// A judge that shares the engines' errors would let them pass.
+/// A reference that shares the engines' errors would let them pass.
 #[test]
 fn the_judge_agrees_with_the_oracle() {
     let mut report = Report::default();
     for file in files() {
         let name = stem(&file);
-        if !JUDGED.contains(&name.as_str()) {
+        if !CHECKED.contains(&name.as_str()) {
             continue;
         }
         let (scene, view) = open(&file).expect("a scene that can be drawn");
         let truth = Image::open(&file.with_extension("npy")).expect("the truth beside the scene");
-        let judge = Reference::new(&scene.mesh, &scene.tetrahedra, &scene.field, &scene.transfer).expect("a scene");
+        let reference = Reference::new(&scene.mesh, &scene.tetrahedra, &scene.field, &scene.transfer).expect("a scene");
         let w = view.size()[0];
         // Primes divide no width: all columns come up.
         for (i, expected) in truth.pixels.iter().enumerate().step_by(if rounds(1) > 1 { 17 } else { 67 }) {
             let at = [i as u32 % w, i as u32 / w];
-            let got = judge.ray(&view.ray(at[0], at[1]), view.blend());
+            let got = reference.ray(&view.ray(at[0], at[1]), view.blend());
             let error = got.iter().zip(expected).map(|(a, b)| (a - f64::from(*b)).abs()).fold(0.0, f64::max);
             report.measure(&name, error, 1e-6, || format!("pixel {at:?} is {got:?}, not {expected:?}"));
         }
     }
     if !files().is_empty() {
-        report.finish("judge");
+        report.finish("reference");
     }
 }

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use halite::field::{Kind, Normal};
+use halite::field::{Kind, Normalization};
 use halite::integral::table::{SecondOrder, SecondOrderLengths, SecondOrderPolynomial, parabola};
 use halite::integral::{Exact, Light};
 use halite::transfer::{Emission, TransferFunction};
@@ -20,7 +20,7 @@ fn exact_of(step: bool, direct: bool, unit_distance: f64) -> Exact<f64> {
     let transfer = TransferFunction::new(color, opacity, unit_distance).unwrap();
     let emission = if direct { Emission::Direct { scale: 1.0 } } else { Emission::Chromatic };
     let transfer = transfer.with_emission(emission).unwrap();
-    Exact::new(&transfer, Kind::Scalar, &[Normal { mid: 0.0, half: 1.0 }; 4], 1.0)
+    Exact::new(&transfer, Kind::Scalar, &[Normalization { mid: 0.0, half: 1.0 }; 4], 1.0)
 }
 
 /// By many segments of the straight lines between points of the parabola.
@@ -33,7 +33,7 @@ fn marched(exact: &Exact<f64>, [f, m, b]: [f64; 3], l: f64) -> [f64; 4] {
     let mut light = Light::none();
     (0..n).for_each(|i| exact.add(&[at(i)], &[at(i + 1)], l / f64::from(n), &mut light));
     let [r, g, b] = light.color;
-    [r, g, b, 1.0 - light.through]
+    [r, g, b, 1.0 - light.transmittance]
 }
 
 fn triples(count: u32) -> impl Iterator<Item = [f64; 3]> {
@@ -145,7 +145,7 @@ fn closed_forms_are_what_integrals_are() {
             true => transfer.with_emission(Emission::Direct { scale: 0.7 }).unwrap(),
             false => transfer.with_clamp(seed % 5 != 0),
         };
-        let exact = Exact::new(&transfer, Kind::Scalar, &[Normal { mid: 0.0, half: 1.0 }; 4], 1.0);
+        let exact = Exact::new(&transfer, Kind::Scalar, &[Normalization { mid: 0.0, half: 1.0 }; 4], 1.0);
         for degree in [1, 2, 4] {
             let (longest, n) = (1.3, 9);
             let want = SecondOrderPolynomial::new(&exact, degree, n, longest).unwrap();

@@ -8,7 +8,7 @@ use halite::field::{Component, Field};
 use halite::gpu::DeviceChoice;
 use halite::grid::{Grid, Lattice};
 use halite::image::Image;
-use halite::integral::choice::{Choice, Form, Texels};
+use halite::integral::options::{Form, IntegrationOptions, Texels};
 use halite::mesh::{Array, Values};
 use halite::render::Renderer;
 use halite::transfer::{Emission, TransferFunction};
@@ -59,7 +59,7 @@ fn renderer(grid: &Grid, transfer: &TransferFunction) -> Renderer {
     renderer
 }
 
-fn draw(renderer: &mut Renderer, order: Order, sampling: Sampling, choice: Choice) -> Image {
+fn draw(renderer: &mut Renderer, order: Order, sampling: Sampling, choice: IntegrationOptions) -> Image {
     renderer.set_reconstruction(Reconstruction { order, sampling });
     renderer.set_integral(choice);
     let image = renderer.render(&view(), &|_| ()).unwrap();
@@ -68,17 +68,22 @@ fn draw(renderer: &mut Renderer, order: Order, sampling: Sampling, choice: Choic
 }
 
 /// Every form with the reconstructions that read it, and how far its pictures may be from those of the integral.
-fn forms() -> Vec<(Order, Sampling, Choice, f64)> {
+fn forms() -> Vec<(Order, Sampling, IntegrationOptions, f64)> {
     let steps = Sampling::Steps(0.1);
-    let small = |form| Choice { table: Some([64, 64, 64]), ..Choice::of(form) };
+    let small = |form| IntegrationOptions { table: Some([64, 64, 64]), ..IntegrationOptions::of(form) };
     vec![
-        (Order::Two, Sampling::Voxels, Choice::of(Form::SecondOrderPolynomial), 2e-2),
-        (Order::Two, steps, Choice::of(Form::SecondOrderPolynomial), 2e-2),
-        (Order::Two, steps, Choice { degree: 1, ..small(Form::SecondOrderPolynomial) }, 2e-2),
-        (Order::Two, steps, Choice { texels: Texels::Unorm16, ..small(Form::SecondOrderPolynomial) }, 2e-2),
-        (Order::One, Sampling::Voxels, Choice::of(Form::Volume), 2e-3),
-        (Order::One, steps, Choice::of(Form::Polynomial), 2e-3),
-        (Order::One, steps, Choice { texels: Texels::Unorm16, ..Choice::of(Form::Volume) }, 2e-3),
+        (Order::Two, Sampling::Voxels, IntegrationOptions::of(Form::SecondOrderPolynomial), 2e-2),
+        (Order::Two, steps, IntegrationOptions::of(Form::SecondOrderPolynomial), 2e-2),
+        (Order::Two, steps, IntegrationOptions { degree: 1, ..small(Form::SecondOrderPolynomial) }, 2e-2),
+        (Order::Two, steps, IntegrationOptions { texels: Texels::Unorm16, ..small(Form::SecondOrderPolynomial) }, 2e-2),
+        (Order::One, Sampling::Voxels, IntegrationOptions::of(Form::Volume), 2e-3),
+        (Order::One, steps, IntegrationOptions::of(Form::Polynomial), 2e-3),
+        (
+            Order::One,
+            steps,
+            IntegrationOptions { texels: Texels::Unorm16, ..IntegrationOptions::of(Form::Volume) },
+            2e-3,
+        ),
     ]
 }
 
@@ -90,7 +95,7 @@ fn tables_show_what_they_stand_for() {
         let transfer = transfer().with_emission(emission).unwrap();
         let mut renderer = renderer(&grid, &transfer);
         for (order, sampling, choice, bound) in forms() {
-            let want = draw(&mut renderer, order, sampling, Choice::default());
+            let want = draw(&mut renderer, order, sampling, IntegrationOptions::default());
             let got = draw(&mut renderer, order, sampling, choice);
             assert!(renderer.stats().table_bytes > 0 && renderer.stats().table_ms > 0.0);
             let (error, name) = (got.compare(&want).unwrap(), choice.form.name());
@@ -109,9 +114,10 @@ fn published_tables_end_with_the_last_whole_slab() {
     let (grid, transfer) = (grid(wave), transfer());
     let mut renderer = renderer(&grid, &transfer);
     let sampling = Sampling::Steps(0.02);
-    let want = draw(&mut renderer, Order::Two, sampling, Choice::default());
+    let want = draw(&mut renderer, Order::Two, sampling, IntegrationOptions::default());
     let off = |renderer: &mut Renderer, n: u32, iterations: u32, texels| {
-        let choice = Choice { table: Some([n; 3]), iterations, texels, ..Choice::of(Form::SecondOrder) };
+        let choice =
+            IntegrationOptions { table: Some([n; 3]), iterations, texels, ..IntegrationOptions::of(Form::SecondOrder) };
         draw(renderer, Order::Two, sampling, choice).compare(&want).unwrap().rmse
     };
     let coarse = off(&mut renderer, 16, 64, Texels::Float);
@@ -124,12 +130,17 @@ fn published_tables_end_with_the_last_whole_slab() {
     let flat = self::grid(|_| 0.2);
     let mut renderer = self::renderer(&flat, &transfer);
     let long = Sampling::Steps(5.0);
-    let plain = draw(&mut renderer, Order::Two, long, Choice::default());
-    let none = draw(&mut renderer, Order::Two, long, Choice { table: Some([8; 3]), ..Choice::of(Form::SecondOrder) });
+    let plain = draw(&mut renderer, Order::Two, long, IntegrationOptions::default());
+    let none = draw(
+        &mut renderer,
+        Order::Two,
+        long,
+        IntegrationOptions { table: Some([8; 3]), ..IntegrationOptions::of(Form::SecondOrder) },
+    );
     assert!(plain.pixels.iter().any(|p| p[3] > 0.1) && none.pixels.iter().all(|p| *p == [0.0; 4]));
     // For all lengths there is a table, whose diagonal is right.
     // The one value is 0 as it is mapped, and one of an odd number of texels.
-    let all = Choice { table: Some([9; 3]), ..Choice::of(Form::SecondOrderPolynomial) };
+    let all = IntegrationOptions { table: Some([9; 3]), ..IntegrationOptions::of(Form::SecondOrderPolynomial) };
     let error = draw(&mut renderer, Order::Two, long, all).compare(&plain).unwrap();
     assert!(error.max < 1e-5, "{:.1e}", error.max);
 }
@@ -147,8 +158,9 @@ fn knots_and_values_may_lie_beyond_each_other() {
         for clamp in [true, false] {
             let transfer = knots(lo, hi).with_clamp(clamp);
             let mut renderer = renderer(&grid, &transfer);
-            let want = draw(&mut renderer, Order::Two, Sampling::Voxels, Choice::default());
-            let choice = Choice { table: Some([96; 3]), ..Choice::of(Form::SecondOrderPolynomial) };
+            let want = draw(&mut renderer, Order::Two, Sampling::Voxels, IntegrationOptions::default());
+            let choice =
+                IntegrationOptions { table: Some([96; 3]), ..IntegrationOptions::of(Form::SecondOrderPolynomial) };
             let got = draw(&mut renderer, Order::Two, Sampling::Voxels, choice).compare(&want).unwrap();
             assert!(got.max < 0.1 && got.rmse < 0.02, "{lo} to {hi}, {clamp}: {:.1e} {:.1e}", got.max, got.rmse);
         }
@@ -160,14 +172,14 @@ fn knots_and_values_may_lie_beyond_each_other() {
 fn edits_do_not_stall_frames() {
     let grid = grid(wave);
     let mut renderer = renderer(&grid, &transfer());
-    let choice = Choice { table: Some([64; 3]), ..Choice::of(Form::SecondOrderPolynomial) };
+    let choice = IntegrationOptions { table: Some([64; 3]), ..IntegrationOptions::of(Form::SecondOrderPolynomial) };
     draw(&mut renderer, Order::Two, Sampling::Voxels, choice);
     let other = TransferFunction::new(vec![(0.0, [0.2, 0.9, 0.4])], vec![(90.0, 0.0), (200.0, 1.0)], 0.3).unwrap();
     renderer.set_transfer(&other);
     let first = renderer.render(&view(), &|_| ()).unwrap();
     assert_eq!(renderer.stats().integral, "exact");
     let mut plain = self::renderer(&grid, &other);
-    let want = draw(&mut plain, Order::Two, Sampling::Voxels, Choice::default());
+    let want = draw(&mut plain, Order::Two, Sampling::Voxels, IntegrationOptions::default());
     assert!(first == want);
     let begun = std::time::Instant::now();
     while renderer.stats().integral != "second-order-polynomial" {
@@ -189,7 +201,7 @@ fn what_has_no_table_is_said() {
         (Order::Midpoint, Sampling::Voxels, Form::Volume, "--integral exact"),
     ] {
         renderer.set_reconstruction(Reconstruction { order, sampling });
-        renderer.set_integral(Choice::of(form));
+        renderer.set_integral(IntegrationOptions::of(form));
         let error = renderer.render(&view(), &|_| ()).unwrap_err().to_string();
         assert!(error.contains(part), "{error}");
     }
@@ -198,7 +210,7 @@ fn what_has_no_table_is_said() {
     renderer.set_mesh(&mesh, halite::mesh::cells::Tetrahedra::new(&mesh).unwrap());
     let name = mesh.point_arrays()[0].name.clone();
     renderer.set_field(&Field::new(&mesh, &name, None, Component::Index(0)).unwrap()).unwrap();
-    renderer.set_integral(Choice::of(Form::SecondOrderPolynomial));
+    renderer.set_integral(IntegrationOptions::of(Form::SecondOrderPolynomial));
     let error = renderer.render(&view(), &|_| ()).unwrap_err().to_string();
     assert!(error.contains("grids"), "{error}");
 }

@@ -1,12 +1,7 @@
 //! Tables in both engines: pictures by each form against the exact ones, and against the oracle's where its scenes are
 //! there.
 
-#![allow(
-    clippy::expect_used,
-    clippy::unwrap_used,
-    clippy::print_stderr,
-    reason = "a test fails by panicking, and tells what it measured"
-)]
+#![allow(clippy::expect_used, clippy::unwrap_used, clippy::print_stderr, reason = "tests fail by panicking")]
 
 mod common;
 
@@ -16,11 +11,11 @@ use glam::{DVec3, dvec3};
 use halite::field::Association;
 use halite::gpu::DeviceChoice;
 use halite::image::Image;
-use halite::integral::choice::{Alpha, Build, Choice, Form, Planes, Texels};
+use halite::integral::options::{Alpha, Build, Form, IntegrationOptions, Planes, Texels};
 use halite::integral::table::Kind;
 use halite::mesh::cells::Tetrahedra;
 use halite::mesh::{Array, Values, generate};
-use halite::project::{Fragments, Switches};
+use halite::project::{Fragments, ProjectionOptions};
 use halite::render::{Engine, Renderer};
 use halite::scene;
 use halite::transfer::{Emission, TransferFunction};
@@ -35,7 +30,7 @@ fn renderers() -> Vec<(&'static str, Renderer)> {
     std::iter::once(("cpu", cpu)).chain(opened).collect()
 }
 
-fn image(renderer: &mut Renderer, choice: Choice, view: &View) -> Image {
+fn image(renderer: &mut Renderer, choice: IntegrationOptions, view: &View) -> Image {
     renderer.set_integral(choice);
     let image = renderer.render(view, &|_| ()).unwrap();
     assert_eq!(renderer.stats().integral, choice.form.name());
@@ -79,16 +74,16 @@ fn bands() -> Scene {
     })
 }
 
-fn volume(lengths: Kind, table: [u32; 3]) -> Choice {
-    Choice { lengths, table: Some(table), ..Choice::of(Form::Volume) }
+fn volume(lengths: Kind, table: [u32; 3]) -> IntegrationOptions {
+    IntegrationOptions { lengths, table: Some(table), ..IntegrationOptions::of(Form::Volume) }
 }
 
-fn polynomial(degree: u32) -> Choice {
-    Choice { degree, table: Some([128, 128, 0]), ..Choice::of(Form::Polynomial) }
+fn polynomial(degree: u32) -> IntegrationOptions {
+    IntegrationOptions { degree, table: Some([128, 128, 0]), ..IntegrationOptions::of(Form::Polynomial) }
 }
 
-fn cylindrical(planes: Planes) -> Choice {
-    Choice { planes, table: Some([64, 64, 64]), ..Choice::of(Form::Cylindrical) }
+fn cylindrical(planes: Planes) -> IntegrationOptions {
+    IntegrationOptions { planes, table: Some([64, 64, 64]), ..IntegrationOptions::of(Form::Cylindrical) }
 }
 
 /// How much of the extinction a medium has that is thin: the approximations of every form are near to what is right there.
@@ -96,28 +91,32 @@ const THIN: f64 = 0.02;
 
 /// Every form, and how far from the exact picture it may be, in the medium as it is and in a thin one. In the former
 /// some forms are of no use: no bound would tell a wrong table.
-fn forms() -> Vec<(Choice, Option<f64>, f64)> {
+fn forms() -> Vec<(IntegrationOptions, Option<f64>, f64)> {
     vec![
         (volume(Kind::Uniform, [128, 128, 32]), Some(5e-3), 4e-4),
         (volume(Kind::Log, [128, 128, 32]), None, 8.5e-3),
         (volume(Kind::LogNormalised, [128, 128, 12]), Some(2e-3), 4e-4),
         (polynomial(1), Some(3e-3), 4e-4),
         (polynomial(2), Some(2e-3), 4e-4),
-        (Choice { alpha: Alpha::Linear, ..polynomial(2) }, None, 5e-3),
+        (IntegrationOptions { alpha: Alpha::Linear, ..polynomial(2) }, None, 5e-3),
         (cylindrical(Planes::Two), Some(2e-2), 1.6e-3),
         (cylindrical(Planes::Packed), Some(2e-2), 1.6e-3),
         (cylindrical(Planes::One), None, 4e-3),
-        (Choice { texels: Texels::Unorm8, ..volume(Kind::LogNormalised, [128, 128, 12]) }, None, 6e-4),
+        (IntegrationOptions { texels: Texels::Unorm8, ..volume(Kind::LogNormalised, [128, 128, 12]) }, None, 6e-4),
     ]
 }
 
 /// What is wrong with the pictures of `scene` by the `forms`, each with its bound.
-fn wrong_forms(all: &mut [(&'static str, Renderer)], scene: &Scene, forms: &[(Choice, f64)]) -> Vec<String> {
+fn wrong_forms(
+    all: &mut [(&'static str, Renderer)],
+    scene: &Scene,
+    forms: &[(IntegrationOptions, f64)],
+) -> Vec<String> {
     let view = view(PERSPECTIVE);
     let emission = scene.transfer.emission();
     let mut wrong = vec![];
     all.iter_mut().for_each(|(_, r)| set(r, scene));
-    let exact: Vec<Image> = all.iter_mut().map(|(_, r)| image(r, Choice::default(), &view)).collect();
+    let exact: Vec<Image> = all.iter_mut().map(|(_, r)| image(r, IntegrationOptions::default(), &view)).collect();
     let most = exact[0].pixels.iter().map(|p| p[3]).fold(0.0, f32::max);
     assert!(most > 0.5 || (0.02..0.2).contains(&most), "{most}");
     for (choice, bound) in forms {
@@ -167,7 +166,7 @@ fn devices_build_what_they_draw_with() {
         for choice in [volume(Kind::LogNormalised, [128, 128, 12]), polynomial(2), cylindrical(Planes::Two)] {
             let [handed, built] = [Build::Host, Build::Device].map(|build| {
                 set(renderer, &scene);
-                let choice = Choice { build, ..choice };
+                let choice = IntegrationOptions { build, ..choice };
                 let first = image(renderer, choice, &view);
                 let uploaded = renderer.stats().uploaded_bytes;
                 assert!(renderer.stats().table_ms > 0.0, "{engine}, {build:?}");
@@ -184,7 +183,7 @@ fn devices_build_what_they_draw_with() {
             assert!(*engine == "cpu" || built.2 + 100_000 < handed.2, "{engine}: {} {}", built.2, handed.2);
         }
         // What a device cannot build, the host does.
-        let degree = Choice { build: Build::Device, ..polynomial(6) };
+        let degree = IntegrationOptions { build: Build::Device, ..polynomial(6) };
         assert!(image(renderer, degree, &view).pixels.iter().any(|p| p[3] > 0.5), "{engine}");
     }
 }
@@ -195,7 +194,7 @@ fn each_degree_is_clearly_better_than_the_one_before() {
     let view = view(PERSPECTIVE);
     for (engine, renderer) in &mut renderers() {
         set(renderer, &scene);
-        let exact = image(renderer, Choice::default(), &view);
+        let exact = image(renderer, IntegrationOptions::default(), &view);
         let [linear, quadratic, quartic] =
             [1, 2, 4].map(|degree| image(renderer, polynomial(degree), &view).compare(&exact).unwrap().rmse);
         eprintln!("{engine}: degree 1 {linear:.1e}, 2 {quadratic:.1e}, 4 {quartic:.1e}");
@@ -210,12 +209,13 @@ fn a_plane_serves_a_cell_in_parallel_views() {
     let mut all = renderers();
     let Some((_, renderer)) = all.iter_mut().find(|r| r.0 == "project") else { return };
     set(renderer, &scene);
-    let per_cell = Choice { per_cell: true, ..cylindrical(Planes::Two) };
+    let per_cell = IntegrationOptions { per_cell: true, ..cylindrical(Planes::Two) };
     let mut errors = |projection| {
         let view = view(projection);
-        renderer.set_switches(Switches::default());
+        renderer.set_projection(ProjectionOptions::default());
         let by_fragment = image(renderer, cylindrical(Planes::Two), &view);
-        renderer.set_switches(Switches { fragments: Fragments::Interpolated, ..Switches::default() });
+        renderer
+            .set_projection(ProjectionOptions { fragments: Fragments::Interpolated, ..ProjectionOptions::default() });
         image(renderer, per_cell, &view).compare(&by_fragment).unwrap().max
     };
     let (parallel, perspective) = (errors(PARALLEL), errors(PERSPECTIVE));
@@ -223,18 +223,18 @@ fn a_plane_serves_a_cell_in_parallel_views() {
     assert!(parallel < 2e-4 && perspective > 2.0 * parallel && perspective < 5e-2);
 }
 
-/// Forms that fields of several components are looked up by, and how far from the judge's pictures: of smooth functions at most,
+/// Forms that fields of several components are looked up by, and how far from the reference's pictures: of smooth functions at most,
 /// and of peaks and steps between texels on average.
-fn forms_of_components() -> [(Choice, f64, f64); 4] {
+fn forms_of_components() -> [(IntegrationOptions, f64, f64); 4] {
     [
-        (Choice::of(Form::Volume), 4e-3, 4e-3),
-        (Choice::of(Form::Polynomial), 1e-3, 2e-3),
+        (IntegrationOptions::of(Form::Volume), 4e-3, 4e-3),
+        (IntegrationOptions::of(Form::Polynomial), 1e-3, 2e-3),
         (volume(Kind::Uniform, [128, 128, 32]), 6e-3, 2e-2),
         (cylindrical(Planes::Two), 2e-2, 5e-2),
     ]
 }
 
-/// Pairs and RGBA: the judge's pictures, by every form and in every engine.
+/// Pairs and RGBA: the reference's pictures, by every form and in every engine.
 #[test]
 fn colours_of_their_own_are_tabulated() {
     let mut all = renderers();
@@ -295,7 +295,7 @@ fn outliers_beside_colours_of_their_own_are_exact() {
         for (engine, renderer) in &mut renderers() {
             set(renderer, &scene);
             for form in [Form::Volume, Form::Polynomial] {
-                let got = image(renderer, Choice::of(form), &view);
+                let got = image(renderer, IntegrationOptions::of(form), &view);
                 let of = |k: usize| {
                     got.pixels.iter().zip(&truth.pixels).map(|(g, t)| (g[k] - t[k]).abs()).fold(0.0, f32::max)
                 };
@@ -324,8 +324,8 @@ fn auto_tabulates_many_knots_of_colours_of_their_own() {
                 TransferFunction::new(vec![(0.0, [1.0, 0.5, 0.2]), (1.0, [0.1, 0.5, 1.0])], opacity, 1.0).unwrap();
             for (engine, renderer) in &mut renderers() {
                 set(renderer, &scene);
-                let exact = image(renderer, Choice::default(), &view);
-                renderer.set_integral(Choice::of(Form::Auto));
+                let exact = image(renderer, IntegrationOptions::default(), &view);
+                renderer.set_integral(IntegrationOptions::of(Form::Auto));
                 renderer.wait_for_table();
                 let got = renderer.render(&view, &|_| ()).unwrap();
                 assert_eq!(renderer.stats().integral, form, "{engine}, {}, {knots} knots", lot.name);
@@ -342,7 +342,7 @@ fn the_largest_value_needs_no_table() {
     let (_, cpu) = &mut renderers()[0];
     set(cpu, &waves(Emission::Chromatic));
     let maximum = view.with_blend(Blend::Maximum);
-    let exact = image(cpu, Choice::default(), &maximum);
+    let exact = image(cpu, IntegrationOptions::default(), &maximum);
     cpu.set_integral(polynomial(2));
     assert!(cpu.render(&maximum, &|_| ()).unwrap() == exact);
 }
@@ -376,7 +376,7 @@ fn reference_scenes_by_tables() {
         for (engine, renderer) in &mut all {
             set(renderer, &scene);
             for form in [Form::Volume, Form::Polynomial] {
-                let error = image(renderer, Choice::of(form), &view).compare(&truth).unwrap();
+                let error = image(renderer, IntegrationOptions::of(form), &view).compare(&truth).unwrap();
                 eprintln!("{name}, {engine}, {form:?}: max {:.1e}, rmse {:.1e}", error.max, error.rmse);
                 assert!(error.max <= 2e-3 && error.rmse <= 2e-4, "{name}, {engine}, {form:?}: {error:?}");
             }
@@ -386,7 +386,7 @@ fn reference_scenes_by_tables() {
     for (engine, renderer) in &mut all {
         set(renderer, &scene);
         let [linear, quadratic, quartic] = [1, 2, 4].map(|degree| {
-            let choice = Choice { degree, ..Choice::of(Form::Polynomial) };
+            let choice = IntegrationOptions { degree, ..IntegrationOptions::of(Form::Polynomial) };
             image(renderer, choice, &view).compare(&truth).unwrap().rmse
         });
         eprintln!("coarse_bands, {engine}: degree 1 {linear:.1e}, 2 {quadratic:.1e}, 4 {quartic:.1e}");

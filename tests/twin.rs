@@ -1,4 +1,4 @@
-//! The engines against the judge: every generated mesh with every kind of transfer function, field and view.
+//! The engines against the reference: every generated mesh with every kind of transfer function, field and view.
 //!
 //! Each test draws one mesh with every look in turn; views and fields pass by at other strides, so that all
 //! combinations come up in the end (HALITE_LONG=1). A wrong neighbour, order, entry, clip, unit or knot shows here.
@@ -11,7 +11,7 @@ use common::draw::{self, FIELDS, LOOKS, MESHES, Random, SIZE, VIEWS};
 use common::{ENGINES, Engine, Report, rounds};
 
 /// Draws the mesh of this name with every look.
-fn judge(name: &str) {
+fn check(name: &str) {
     let m = MESHES.iter().position(|m| m.0 == name).expect("it is in the table");
     let mut report = Report::default();
     for round in 0..rounds(2) {
@@ -38,7 +38,7 @@ fn judge(name: &str) {
 
 macro_rules! meshes {
     ($($test:ident: $name:literal,)*) => {
-        $(#[test] fn $test() { judge($name); })*
+        $(#[test] fn $test() { check($name); })*
 
         #[test]
         fn every_mesh_is_judged() {

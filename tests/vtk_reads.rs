@@ -1,13 +1,7 @@
 //! What Halite reads from a file is what VTK reads, value by value: from files that VTK writes here, and from others
 //! where they are at hand. Needs a Python with VTK 9; with HALITE_REQUIRE_VTK=1 it fails where there is none.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    clippy::print_stderr,
-    reason = "a test fails by panicking"
-)]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stderr, reason = "tests")]
 
 #[path = "vtk/random.rs"]
 mod random;

@@ -121,7 +121,7 @@ struct Renderer::Inner
     const bridge::Stats s = bridge::stats(*this->Box);
     const std::lock_guard<std::mutex> lock(this->LatestMutex);
     this->Latest = { std::string(s.engine), std::string(s.device), std::string(s.adapter), s.cells, s.tetrahedra,
-      s.faces_ms, s.upload_ms, s.frame_ms, s.steps, s.repaired_rays, s.device_bytes, s.uploaded_bytes };
+      s.faces_ms, s.upload_ms, s.frame_ms, s.steps, s.retraced_rays, s.device_bytes, s.uploaded_bytes };
   }
 };
 

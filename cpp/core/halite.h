@@ -384,7 +384,7 @@ struct Statistics
   std::string engine, device, adapter;
   std::uint64_t cells = 0, tetrahedra = 0;
   double facesMs = 0, uploadMs = 0, frameMs = 0;
-  std::uint64_t steps = 0, repairedRays = 0, deviceBytes = 0, uploadedBytes = 0;
+  std::uint64_t steps = 0, retracedRays = 0, deviceBytes = 0, uploadedBytes = 0;
 };
 
 /// The form of the ray integral, by the names that scenes have for it. Empty names mean the first that is said here. What

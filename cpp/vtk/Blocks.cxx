@@ -1,16 +1,18 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 #include "Blocks.h"
 
+#include "Leaves.h"
+
 #include "vtkCamera.h"
-#include "vtkCompositeDataIterator.h"
-#include "vtkCompositeDataSet.h"
-#include "vtkDataSet.h"
 #include "vtkMatrix4x4.h"
 #include "vtkNew.h"
 #include "vtkRenderer.h"
 
 #include <algorithm>
 #include <array>
+
+namespace halite_vtk
+{
 
 namespace
 {
@@ -64,24 +66,9 @@ bool IsBefore(const Box& a, const Box& b, const Eye& eye)
 std::vector<Block> Block::Of(vtkDataObject* input)
 {
   std::vector<Block> blocks;
-  const auto add = [&blocks](vtkDataObject* leaf) {
-    vtkDataSet* grid = vtkDataSet::SafeDownCast(leaf);
-    if (grid && grid->GetNumberOfCells() > 0)
-    {
-      blocks.push_back({ grid, blocks.size() });
-    }
-  };
-  if (auto composite = vtkCompositeDataSet::SafeDownCast(input))
+  for (const vtkSmartPointer<vtkDataSet>& grid : LeavesOf(input))
   {
-    const auto leaves = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
-    for (leaves->InitTraversal(); !leaves->IsDoneWithTraversal(); leaves->GoToNextItem())
-    {
-      add(leaves->GetCurrentDataObject());
-    }
-  }
-  else
-  {
-    add(input);
+    blocks.push_back({ grid, blocks.size() });
   }
   return blocks;
 }
@@ -126,4 +113,6 @@ void Block::Sort(std::vector<Block>& blocks, vtkRenderer* renderer, const halite
     }
   }
   blocks.swap(sorted);
+}
+
 }

@@ -17,6 +17,9 @@ class vtkDataSet;
 class vtkRenderer;
 VTK_ABI_NAMESPACE_END
 
+namespace halite_vtk
+{
+
 struct Block
 {
   vtkSmartPointer<vtkDataSet> Grid;
@@ -30,3 +33,5 @@ struct Block
   // eye's side of a plane between them; where they overlap, of the plane that they overlap least across.
   static void Sort(std::vector<Block>& blocks, vtkRenderer* renderer, const halite::Renderer::Matrix& placement);
 };
+
+}

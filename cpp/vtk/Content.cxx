@@ -12,6 +12,9 @@
 
 #include <algorithm>
 
+namespace halite_vtk
+{
+
 namespace
 {
 
@@ -147,4 +150,6 @@ void Content::ChooseFunction(vtkVolume* volume, halite::OpacityConvention conven
   {
     this->FunctionKey << k.scalar << k.opacity;
   }
+}
+
 }

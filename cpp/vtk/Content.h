@@ -17,6 +17,9 @@ VTK_ABI_NAMESPACE_BEGIN
 class vtkVolume;
 VTK_ABI_NAMESPACE_END
 
+namespace halite_vtk
+{
+
 struct Content
 {
   // How the core is to work.
@@ -53,3 +56,5 @@ private:
   void ChooseInterpolation(vtkVolume* volume);
   void ChooseFunction(vtkVolume* volume, halite::OpacityConvention convention, Functions::Cache& functions);
 };
+
+}

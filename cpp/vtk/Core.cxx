@@ -6,6 +6,9 @@
 #include "vtkDataArray.h"
 #include "vtkLogger.h"
 
+namespace halite_vtk
+{
+
 namespace
 {
 
@@ -131,4 +134,6 @@ bool Core::Draw(const halite::View& view, std::vector<float>& pixels, const hali
 halite::Statistics Core::GetStatistics() const
 {
   return this->Renderer ? this->Renderer->statistics() : halite::Statistics();
+}
+
 }

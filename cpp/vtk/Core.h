@@ -12,6 +12,9 @@
 #include <string>
 #include <vector>
 
+namespace halite_vtk
+{
+
 class Core
 {
 public:
@@ -49,7 +52,9 @@ private:
   std::unique_ptr<halite::Renderer> Renderer;
   Key SettingsKey, IntegralKey, MeshKey, PlacementKey, FieldKey, FunctionKey;
   Counts Done;
-  ::Messages Messages;
+  halite_vtk::Messages Messages;
   // What a step that is at work has warned of, and what is to be said.
   std::vector<std::string> Said, Warnings;
 };
+
+}

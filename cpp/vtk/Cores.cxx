@@ -3,6 +3,9 @@
 
 #include <algorithm>
 
+namespace halite_vtk
+{
+
 namespace
 {
 
@@ -111,4 +114,6 @@ std::vector<std::string> Cores::TakeWarnings()
     }
   }
   return all;
+}
+
 }

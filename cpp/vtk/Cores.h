@@ -9,6 +9,9 @@
 #include <string>
 #include <vector>
 
+namespace halite_vtk
+{
+
 class Cores
 {
 public:
@@ -35,3 +38,5 @@ private:
   Core::Counts Gone;
   std::vector<float> Behind;
 };
+
+}

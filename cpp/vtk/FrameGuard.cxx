@@ -16,6 +16,9 @@
 #include <map>
 #include <mutex>
 
+namespace halite_vtk
+{
+
 namespace
 {
 
@@ -178,4 +181,6 @@ void FrameGuard::Execute(vtkObject* caller, unsigned long, void*)
     }
   }
   caller->RemoveObserver(this->Observer);
+}
+
 }

@@ -21,6 +21,9 @@ class vtkVolume;
 class vtkWindow;
 VTK_ABI_NAMESPACE_END
 
+namespace halite_vtk
+{
+
 // Observers may take away, in the middle of a frame, what VTK is drawing: volumes, mappers, renderers. VTK goes on with what
 // it began, and keeps nothing of it alive. This does, until the window has finished the frame.
 class FrameGuard : public vtkCommand
@@ -60,3 +63,5 @@ private:
   // Renderers that are in this window for the frame alone, and where observers put them.
   std::map<vtkRenderer*, vtkWeakPointer<vtkRenderWindow>> Moved;
 };
+
+}

@@ -10,6 +10,9 @@
 #include <cmath>
 #include <limits>
 
+namespace halite_vtk
+{
+
 namespace
 {
 
@@ -264,7 +267,7 @@ const Knots& Cache::KnotsOf(vtkVolumeProperty* property, bool isRGBA)
   vtkPiecewiseFunction* opacity = property->GetScalarOpacity(0);
   vtkPiecewiseFunction* greys = isGrey ? property->GetGrayTransferFunction(0) : nullptr;
   vtkColorTransferFunction* colors = isGrey ? nullptr : property->GetRGBTransferFunction(0);
-  ::Key sources;
+  halite_vtk::Key sources;
   sources << static_cast<std::uint64_t>(opacity->GetMTime())
           << static_cast<std::uint64_t>(isGrey ? greys->GetMTime() : colors->GetMTime())
           << static_cast<std::uint64_t>(isRGBA);
@@ -289,6 +292,8 @@ const Knots& Cache::KnotsOf(vtkVolumeProperty* property, bool isRGBA)
     }
   }
   return knots;
+}
+
 }
 
 }

@@ -15,6 +15,9 @@ class vtkPiecewiseFunction;
 class vtkVolumeProperty;
 VTK_ABI_NAMESPACE_END
 
+namespace halite_vtk
+{
+
 namespace Functions
 {
 
@@ -29,7 +32,7 @@ Opacity KnotsOf(vtkPiecewiseFunction* function);
 
 struct Knots
 {
-  ::Key Sources;
+  halite_vtk::Key Sources;
   Functions::Color Color;
   Functions::Opacity Opacity;
 };
@@ -44,5 +47,7 @@ public:
 private:
   std::map<vtkVolumeProperty*, Knots> Kept;
 };
+
+}
 
 }

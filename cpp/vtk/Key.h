@@ -8,6 +8,9 @@
 #include <string>
 #include <vector>
 
+namespace halite_vtk
+{
+
 // Numbers and texts in order: what was made for one key serves all that are equal to it.
 class Key
 {
@@ -53,3 +56,5 @@ public:
 private:
   std::vector<std::uint64_t> Words;
 };
+
+}

@@ -3,6 +3,9 @@
 
 #include <algorithm>
 
+namespace halite_vtk
+{
+
 namespace
 {
 
@@ -101,4 +104,6 @@ void Layers::DropUnused()
   {
     layer.IsUsed = false;
   }
+}
+
 }

@@ -8,6 +8,9 @@
 #include <list>
 #include <vector>
 
+namespace halite_vtk
+{
+
 class Layers
 {
 public:
@@ -38,3 +41,5 @@ private:
   std::list<Layer> All;
   std::vector<float> Drawn;
 };
+
+}

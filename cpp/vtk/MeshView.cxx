@@ -26,6 +26,9 @@
 #include <array>
 #include <cstring>
 
+namespace halite_vtk
+{
+
 namespace
 {
 
@@ -381,4 +384,6 @@ std::vector<std::uint64_t> MeshView::Identity(vtkDataSet* base)
     Time(vtkHaliteCompatibility::GetCellTypes(grid)), Time(Ghosts(grid->GetPointData())),
     Time(Ghosts(grid->GetCellData())), static_cast<std::uint64_t>(grid->GetNumberOfPoints()),
     static_cast<std::uint64_t>(grid->GetNumberOfCells()) };
+}
+
 }

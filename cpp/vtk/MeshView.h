@@ -17,6 +17,9 @@ class vtkDataSet;
 class vtkPoints;
 VTK_ABI_NAMESPACE_END
 
+namespace halite_vtk
+{
+
 class MeshView
 {
 public:
@@ -47,3 +50,5 @@ private:
   std::vector<vtkSmartPointer<vtkDataArray>> Kept;
   int Copies = 0;
 };
+
+}

@@ -3,6 +3,9 @@
 
 #include <cctype>
 
+namespace halite_vtk
+{
+
 std::string Messages::WithoutNumbers(const std::string& message)
 {
   std::string kind;
@@ -39,4 +42,6 @@ std::vector<std::string> Messages::New(int step, const std::vector<std::string>&
   }
   before.swap(now);
   return fresh;
+}
+
 }

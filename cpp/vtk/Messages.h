@@ -7,6 +7,9 @@
 #include <string>
 #include <vector>
 
+namespace halite_vtk
+{
+
 class Messages
 {
 public:
@@ -19,3 +22,5 @@ public:
 private:
   std::map<int, std::set<std::string>> Held;
 };
+
+}

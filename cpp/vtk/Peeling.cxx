@@ -26,6 +26,9 @@
 #include <stdexcept>
 #include <string>
 
+namespace halite_vtk
+{
+
 namespace
 {
 
@@ -218,7 +221,7 @@ void Peeling::ReadIntervals(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper
   {
     throw std::runtime_error("the window refuses a texture of 32-bit floats");
   }
-  vtkOpenGLQuadHelper& quad = this->Ready(this->IntervalShaders[this->Now], ::IntervalShaders[this->Now]);
+  vtkOpenGLQuadHelper& quad = this->Ready(this->IntervalShaders[this->Now], halite_vtk::IntervalShaders[this->Now]);
   state->PushFramebufferBindings();
   buffer->Bind();
   buffer->AddColorAttachment(0, depths);
@@ -256,7 +259,7 @@ void Peeling::Composite(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vt
   state->vtkglBlendFuncSeparate(OpenGL::One, OpenGL::OneMinusSourceAlpha, OpenGL::One, OpenGL::OneMinusSourceAlpha);
   state->vtkglBlendEquation(OpenGL::Add);
 
-  vtkOpenGLQuadHelper& quad = this->Ready(this->CompositeShaders[this->Now], ::CompositeShaders[this->Now]);
+  vtkOpenGLQuadHelper& quad = this->Ready(this->CompositeShaders[this->Now], halite_vtk::CompositeShaders[this->Now]);
   pass->SetShaderParameters(quad.Program, mapper, volume);
   vtkTextureObject* const textures[] = { kept, front, back };
   const char* const names[] = { "kept", "front", "back" };
@@ -273,4 +276,6 @@ void Peeling::Composite(vtkOpenGLRenderPass* pass, vtkAbstractMapper* mapper, vt
   }
   // What the pass has set for volumes.
   state->vtkglBlendEquation(this->Now == Rest ? OpenGL::Add : OpenGL::Largest);
+}
+
 }

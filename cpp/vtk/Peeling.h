@@ -20,6 +20,9 @@ class vtkTextureObject;
 class vtkVolume;
 VTK_ABI_NAMESPACE_END
 
+namespace halite_vtk
+{
+
 // Window depths between which a part of a pixel's ray lies: nothing of it if they do not grow.
 struct Interval
 {
@@ -76,3 +79,5 @@ private:
   Stage Now = Unknown;
   std::array<std::unique_ptr<vtkOpenGLQuadHelper>, 3> IntervalShaders, CompositeShaders;
 };
+
+}

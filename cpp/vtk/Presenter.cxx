@@ -17,6 +17,9 @@
 #include <algorithm>
 #include <stdexcept>
 
+namespace halite_vtk
+{
+
 namespace
 {
 
@@ -180,4 +183,6 @@ void Presenter::Present(vtkTextureObject* texture, const Viewport& v)
   this->Quad->Program->SetUniformi("picture", texture->GetTextureUnit());
   this->Quad->Render();
   texture->Deactivate();
+}
+
 }

@@ -10,8 +10,6 @@
 #include <memory>
 #include <vector>
 
-class Peeling;
-
 VTK_ABI_NAMESPACE_BEGIN
 class vtkOpenGLQuadHelper;
 class vtkOpenGLRenderWindow;
@@ -19,6 +17,11 @@ class vtkRenderer;
 class vtkTextureObject;
 class vtkWindow;
 VTK_ABI_NAMESPACE_END
+
+namespace halite_vtk
+{
+
+class Peeling;
 
 // The part of a frame buffer that a renderer draws to, in pixels from its lower left corner.
 struct Viewport
@@ -61,3 +64,5 @@ private:
   std::unique_ptr<Peeling> Peels;
   std::unique_ptr<vtkOpenGLQuadHelper> Quad;
 };
+
+}

@@ -12,6 +12,9 @@
 
 #include <algorithm>
 
+namespace halite_vtk
+{
+
 namespace
 {
 
@@ -72,4 +75,6 @@ void SceneView::Crop(const std::array<double, 6>& planes, int regions, const hal
   {
     this->Key << plane;
   }
+}
+
 }

@@ -14,10 +14,13 @@ class vtkPlaneCollection;
 class vtkRenderer;
 VTK_ABI_NAMESPACE_END
 
+namespace halite_vtk
+{
+
 struct SceneView
 {
   halite::View View;
-  ::Key Key;
+  halite_vtk::Key Key;
 
   // `width` x `height` rays.
   SceneView(vtkRenderer* renderer, int width, int height, bool isMaximum, vtkPlaneCollection* planes);
@@ -25,3 +28,5 @@ struct SceneView
   // Has some of the regions between planes of the data drawn, which a volume places.
   void Crop(const std::array<double, 6>& planes, int regions, const halite::Renderer::Matrix& placement);
 };
+
+}

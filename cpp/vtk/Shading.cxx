@@ -12,6 +12,9 @@
 
 #include <algorithm>
 
+namespace halite_vtk
+{
+
 namespace
 {
 
@@ -166,7 +169,7 @@ bool Shading::NeedsGradient() const
 
 Key Shading::Key() const
 {
-  ::Key key;
+  halite_vtk::Key key;
   key << static_cast<std::uint64_t>(this->GradientOpacity.size());
   for (const auto& k : this->GradientOpacity)
   {
@@ -196,4 +199,6 @@ Key Shading::Key() const
     }
   }
   return key;
+}
+
 }

@@ -15,6 +15,9 @@ class vtkRenderer;
 class vtkVolumeProperty;
 VTK_ABI_NAMESPACE_END
 
+namespace halite_vtk
+{
+
 struct Shading
 {
   std::vector<halite::TransferFunction::GradientKnot> GradientOpacity;
@@ -37,5 +40,7 @@ struct Shading
   // Whether it needs the gradient of the field.
   bool NeedsGradient() const;
   // What it depends on.
-  ::Key Key() const;
+  halite_vtk::Key Key() const;
 };
+
+}

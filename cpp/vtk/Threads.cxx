@@ -12,6 +12,9 @@
 #include <sched.h>
 #endif
 
+namespace halite_vtk
+{
+
 namespace
 {
 
@@ -77,4 +80,5 @@ std::size_t Threads::Of(int asked)
   }
   const std::size_t most = Number("VTK_SMP_MAX_THREADS");
   return std::min<std::size_t>(most > 0 ? std::min(threads, most) : threads, 1024);
+}
 }

@@ -4,6 +4,9 @@
 
 #include <cstddef>
 
+namespace halite_vtk
+{
+
 class Threads
 {
 public:
@@ -14,3 +17,5 @@ public:
   // How many processes a launcher of MPI started on this node, this one among them; 1 where none says so.
   static std::size_t ProcessesOfNode();
 };
+
+}

@@ -24,6 +24,8 @@
 #include <cmath>
 #include <stdexcept>
 
+using namespace halite_vtk;
+
 VTK_ABI_NAMESPACE_BEGIN
 
 namespace

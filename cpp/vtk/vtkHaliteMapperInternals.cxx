@@ -23,6 +23,8 @@
 
 #include <algorithm>
 
+using namespace halite_vtk;
+
 VTK_ABI_NAMESPACE_BEGIN
 
 void vtkHaliteMapper::Internals::ErrorOnce(const std::string& what)

@@ -55,10 +55,10 @@ struct vtkHaliteMapper::Internals
     vtkWeakPointer<vtkRenderer> Renderer;
     vtkWeakPointer<vtkVolume> Volume;
     int Eye = 0;
-    Key Pictured;
+    halite_vtk::Key Pictured;
     std::vector<float> Depths;
     vtkSmartPointer<vtkTextureObject> Texture;
-    ::Layers Layers;
+    halite_vtk::Layers Layers;
     // Before the first of these surfaces, and not drawn yet.
     std::vector<float> Kept;
   };
@@ -74,12 +74,12 @@ struct vtkHaliteMapper::Internals
   static std::string Text(const char* s) { return s ? s : ""; }
 
   vtkHaliteMapper& Self;
-  ::Cores Cores;
-  Functions::Cache Knots;
+  halite_vtk::Cores Cores;
+  halite_vtk::Functions::Cache Knots;
   std::list<Frame> Frames;
-  std::list<Presenter> Presenters;
+  std::list<halite_vtk::Presenter> Presenters;
   // What of the content failed since something was drawn, and what for: nothing of that is tried, and nothing is said, twice.
-  Key Failed;
+  halite_vtk::Key Failed;
   std::set<std::string> Errors;
   std::set<std::string> Warned;
   std::vector<float> Pixels;
@@ -94,7 +94,7 @@ struct vtkHaliteMapper::Internals
   vtkOpenGLRenderPass* TargetPass = nullptr;
   bool IsReleased = false;
   std::list<Frame> OldFrames;
-  std::list<Presenter> OldPresenters;
+  std::list<halite_vtk::Presenter> OldPresenters;
 
   // Makes a frame the one that is at work; ends with it.
   class Turn
@@ -134,14 +134,15 @@ struct vtkHaliteMapper::Internals
   // The blend mode, if it is none that is drawn.
   void WarnOfUnsupported();
   // Has a second variable and light drawn, as far as what is drawn has them.
-  void Shade(Content& content, vtkVolume* volume, vtkRenderer* renderer, bool isMaximum);
+  void Shade(halite_vtk::Content& content, vtkVolume* volume, vtkRenderer* renderer, bool isMaximum);
 
-  Presenter& PresenterOf(vtkOpenGLRenderWindow* window);
+  halite_vtk::Presenter& PresenterOf(vtkOpenGLRenderWindow* window);
   Frame& FrameOf(vtkRenderer* renderer, vtkVolume* volume);
   // Lets go what was made for a window: at once, or when the frame that is at work is over.
   void Release(vtkWindow* window);
   // What is drawn of each grid, the nearest first.
-  std::vector<Content> Choose(std::vector<Block> blocks, vtkVolume* volume, vtkRenderer* renderer, bool isMaximum);
+  std::vector<halite_vtk::Content> Choose(
+    std::vector<halite_vtk::Block> blocks, vtkVolume* volume, vtkRenderer* renderer, bool isMaximum);
   // Between rays, in pixels.
   double SampleDistance() const;
   // Draws once the renderer has finished.
@@ -154,14 +155,14 @@ struct vtkHaliteMapper::Internals
   void DrawIn(vtkOpenGLRenderWindow* window, vtkRenderer* renderer, vtkVolume* volume);
 
   // These are false if what they draw was given up. By the core:
-  bool Draw(const std::vector<Content>& contents, const halite::View& view, vtkOpenGLRenderWindow* window,
+  bool Draw(const std::vector<halite_vtk::Content>& contents, const halite::View& view, vtkOpenGLRenderWindow* window,
     std::vector<float>& pixels);
   // Into the window, as one picture:
-  bool Show(const std::vector<Content>& contents, SceneView& view, const Viewport& viewport, Presenter& presenter,
-    Frame& frame);
+  bool Show(const std::vector<halite_vtk::Content>& contents, halite_vtk::SceneView& view,
+    const halite_vtk::Viewport& viewport, halite_vtk::Presenter& presenter, Frame& frame);
   // Into the layers of a pass of depth peeling:
-  bool Peel(const std::vector<Content>& contents, SceneView& view, Presenter& presenter, Frame& frame,
-    vtkOpenGLRenderPass* pass);
+  bool Peel(const std::vector<halite_vtk::Content>& contents, halite_vtk::SceneView& view,
+    halite_vtk::Presenter& presenter, Frame& frame, vtkOpenGLRenderPass* pass);
 };
 
 VTK_ABI_NAMESPACE_END

@@ -2,11 +2,11 @@
 """Halite beside ParaView's own mappers, with times and errors in one table: on large grids that this makes, and on meshes as programs
 write them:
 
-    pvbatch mappers.py HALITE.SO FOLDER OUT [--judge 'COMMAND {scene} {folder}'] [--cases NAME...] [--cells SHARE]
+    pvbatch mappers.py HALITE.SO FOLDER OUT [--reference 'COMMAND {scene} {folder}'] [--cases NAME...] [--cells SHARE]
 
 FOLDER has the files that CASES names, or legacy files beside them (.vtk), which are taken first: ParaView 5.11 does not
 read the faces of polyhedra as VTK's XML files have them since version 2.3. OUT gets scene files, pictures, and the grids that are made,
-of some SHARE (1 by default) of a million hexahedra and 1.3 million tetrahedra. With a judge, a program that draws OUT/NAME.json as Halite's
+of some SHARE (1 by default) of a million hexahedra and 1.3 million tetrahedra. With a reference, a program that draws OUT/NAME.json as Halite's
 scene files describe it and leaves OUT/NAME.npy (rows from the top, premultiplied RGBA), errors are those against it, in 255ths, over
 black: the greatest, and the root of their mean square. Of cells other than tetrahedra there are two judgements: of cells with curved faces
 and a field that is trilinear (or likewise) inside, and of the tetrahedra that Halite cuts cells into, by a rule that `split` has once more. The first image includes what a mapper's representation does to the grid; frames are medians of three views.
@@ -179,13 +179,13 @@ def drawn(source, mapper, association, name, camera, unit, color, opacity, size)
     return found, first, statistics.median(frames)
 
 
-def judged(judge, scene, name, out):
-    """The judge's picture of a scene, in 255ths over black."""
+def reference_picture(reference, scene, name, out):
+    """The reference's picture of a scene, in 255ths over black."""
     with open(os.path.join(out, name + ".json"), "w") as f:
         json.dump(scene, f)
-    if not judge:
+    if not reference:
         return None
-    command = shlex.split(judge.format(scene=os.path.join(out, name + ".json"), folder=out))
+    command = shlex.split(reference.format(scene=os.path.join(out, name + ".json"), folder=out))
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     return 255 * np.load(os.path.join(out, name + ".npy"))[..., :3]
 
@@ -197,7 +197,7 @@ def apart(found, truth):
     return f"{off.max():.1f} | {np.sqrt((off ** 2).mean()):.2f}"
 
 
-def measure(case, folder, out, judge, share):
+def measure(case, folder, out, reference, share):
     file, association, name, (low, high) = CASES[case]
     size = SIZE if file else LARGE
     path = os.path.abspath(os.path.join(folder, file) if file else os.path.join(out, case + ".vtu"))
@@ -220,17 +220,17 @@ def measure(case, folder, out, judge, share):
              "opacity": opacity, "unit_distance": unit, "convention": "opacity" if is_image else "extinction",
              "camera": camera, "size": size}
     if "polyhedra" in case:
-        # What a judge cannot draw as it is, it may cut; in values of cells nothing depends on how.
+        # What a reference cannot draw as it is, it may cut; in values of cells nothing depends on how.
         scene["cells"] = "tets"
     if array.GetNumberOfComponents() > 1:
         scene["scalars"]["component"] = "magnitude"
-    truth, of_split = judged(judge, scene, case, out), None
-    if judge and not is_image and "polyhedra" not in case:
+    truth, of_split = reference_picture(reference, scene, case, out), None
+    if reference and not is_image and "polyhedra" not in case:
         grid = servermanager.Fetch(reader)
         cut = split(grid) if np.any(numpy_support.vtk_to_numpy(grid.GetCellTypesArray()) != 10) else None
         if cut:
             write(cut, os.path.join(out, case + "_split.vtu"))
-            of_split = judged(judge, {**scene, "mesh": os.path.abspath(os.path.join(out, case + "_split.vtu"))}, case + "_split", out)
+            of_split = reference_picture(reference, {**scene, "mesh": os.path.abspath(os.path.join(out, case + "_split.vtu"))}, case + "_split", out)
         else:
             of_split = truth
     for mapper in MAPPERS["UniformGridRepresentation" if is_image else "UnstructuredGridRepresentation"]:
@@ -248,7 +248,7 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     for argument in ("plugin", "folder", "out"):
         parser.add_argument(argument)
-    parser.add_argument("--judge")
+    parser.add_argument("--reference")
     parser.add_argument("--cases", nargs="+", default=list(CASES), choices=CASES)
     parser.add_argument("--cells", type=float, default=1.0)
     arguments = parser.parse_args()
@@ -257,4 +257,4 @@ if __name__ == "__main__":
     print("| mesh, cells | mapper | first image | frame | greatest error | RMSE | of tetrahedra | RMSE |\n|---|---|---|---|---|---|---|---|",
           flush=True)
     for each in arguments.cases:
-        measure(each, arguments.folder, arguments.out, arguments.judge, arguments.cells)
+        measure(each, arguments.folder, arguments.out, arguments.reference, arguments.cells)

@@ -2,10 +2,9 @@
 #include "vtkHaliteImageVolumeRepresentation.h"
 
 #include "AnyGridVolume.h"
+#include "Leaves.h"
 #include "vtkHaliteMapper.h"
 
-#include "vtkCompositeDataIterator.h"
-#include "vtkCompositeDataSet.h"
 #include "vtkDataObject.h"
 #include "vtkDataSet.h"
 #include "vtkInformation.h"
@@ -90,32 +89,6 @@ namespace
 // The core draws each with threads of its own.
 constexpr std::size_t MostGrids = 64;
 
-// The grids with cells of what was delivered.
-std::vector<vtkDataSet*> GridsOf(vtkDataObject* delivered)
-{
-  std::vector<vtkDataSet*> grids;
-  const auto add = [&grids](vtkDataObject* leaf) {
-    vtkDataSet* grid = vtkDataSet::SafeDownCast(leaf);
-    if (grid && grid->GetNumberOfCells() > 0)
-    {
-      grids.push_back(grid);
-    }
-  };
-  if (auto composite = vtkCompositeDataSet::SafeDownCast(delivered))
-  {
-    const auto leaves = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
-    for (leaves->InitTraversal(); !leaves->IsDoneWithTraversal(); leaves->GoToNextItem())
-    {
-      add(leaves->GetCurrentDataObject());
-    }
-  }
-  else
-  {
-    add(delivered);
-  }
-  return grids;
-}
-
 // Planes around a box that a matrix moves, whose inside is in front of each.
 vtkSmartPointer<vtkPlaneCollection> Around(const std::array<double, 6>& box, vtkMatrix4x4* matrix)
 {
@@ -149,7 +122,7 @@ bool vtkHaliteImageVolumeRepresentation::Connect(vtkHaliteMapper* halite)
     return false;
   }
   vtkDataObject* delivered = this->VolumeMapper->GetInputDataObject(0, 0);
-  const std::vector<vtkDataSet*> grids = GridsOf(delivered);
+  const std::vector<vtkSmartPointer<vtkDataSet>> grids = halite_vtk::LeavesOf(delivered);
   if (grids.empty())
   {
     return false;

@@ -52,7 +52,7 @@ class Renderer:
     sampling : float, optional
         With `reconstruction`: how far samples are apart, in world units; at faces of voxels and midway by default.
     projection : dict, optional
-        Switches of the engine "project" on devices, as scene files have them.
+        Options of the engine "project" on devices, as scene files have them.
     placement : array of shape (4, 4), optional
         From the mesh's coordinates to the world; affine.
 

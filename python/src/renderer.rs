@@ -10,7 +10,7 @@ use halite::image::{Backdrop, Image};
 use halite::io::DataSet;
 use halite::mesh::Array;
 use halite::mesh::cells::Tetrahedra;
-use halite::project::Switches;
+use halite::project::ProjectionOptions;
 use halite::scene::{self, Scalars};
 use numpy::{IntoPyArray, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -140,7 +140,7 @@ impl Renderer {
         Ok(range)
     }
 
-    /// How rays are integrated, how grids are rebuilt along them, and the projection's switches; the first and the last are texts
+    /// How rays are integrated, how grids are rebuilt along them, and the projection's options; the first and the last are texts
     /// of JSON, as scenes have them.
     fn set_options(
         &self,
@@ -155,11 +155,12 @@ impl Renderer {
             value.and_then(|v| read(&v)).map_err(|e| Error::new_err(format!("{what}: {e}")))
         }
         let integral = integral.map(|text| parsed("integral", text, scene::integral)).transpose()?;
-        let projection = projection.map(|text| parsed("projection", text, scene::read::<Switches>)).transpose()?;
+        let projection =
+            projection.map(|text| parsed("projection", text, scene::read::<ProjectionOptions>)).transpose()?;
         self.with(py, |session| {
             session.set_reconstruction(reconstruction, sampling)?;
-            if let Some(switches) = projection {
-                session.set_switches(switches);
+            if let Some(projection) = projection {
+                session.set_projection(projection);
             }
             integral.map_or(Ok(()), |choice| session.set_integral(choice))
         })

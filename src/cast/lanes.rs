@@ -25,7 +25,7 @@ mod walk;
 use super::ray::{Frame, Visible, enter, least_light};
 use super::reconstruction::{Order, Reconstruction, Sampling};
 use super::volume::Volume;
-use crate::field::Normal;
+use crate::field::Normalization;
 use crate::mesh::{Values, with_values};
 use crate::view::Blend;
 use corners::{STEPS, Texel};
@@ -83,7 +83,7 @@ impl<'a> Scene<'a> {
         if frame.table.is_some() && samples.missing.is_some() || volume.point_count() > u32::MAX as usize {
             return None;
         }
-        let normal: Normal = samples.normal[0];
+        let normal: Normalization = samples.normal[0];
         let (plain, integers) = kind(&samples.values);
         let lines = Lines::new(exact, normal, plain)?;
         let map = if plain { lines.map } else { Map { mid: 0.0, factor: 1.0 } };

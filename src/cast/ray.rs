@@ -201,7 +201,7 @@ impl<const N: usize> Caster<'_, N> {
     fn finished(&self, gathered: &Gathered<N>) -> [f32; 4] {
         match (self.frame.view.blend(), &gathered.largest) {
             (Blend::Composite, _) => {
-                let Light { color: [r, g, b], through } = gathered.light;
+                let Light { color: [r, g, b], transmittance: through } = gathered.light;
                 [r, g, b, 1.0 - through].map(|c| c as f32)
             }
             (Blend::Maximum, Some(values)) => (self.frame.pixel)(values),
@@ -225,7 +225,7 @@ impl<const N: usize> Caster<'_, N> {
             if self.seen[self.frame.samples.block(at)] {
                 let place = |t: f64| line.place(volume, at, t);
                 self.voxel(at, place(t), place(to), (to - t) * volume.scale, &mut gathered);
-                if gathered.light.through < least_light(self.frame.exact.direct) {
+                if gathered.light.transmittance < least_light(self.frame.exact.direct) {
                     return ControlFlow::Break(());
                 }
             }
@@ -263,7 +263,7 @@ impl<const N: usize> Caster<'_, N> {
             let samples = std::array::from_fn(|k| [front[k], middle[k], back[k]]);
             self.slab(self.frame.reconstruction.order, &samples, (to - t) * self.frame.volume.scale, gathered);
             gathered.steps += 1;
-            if gathered.light.through < least_light(self.frame.exact.direct) || to <= t {
+            if gathered.light.transmittance < least_light(self.frame.exact.direct) || to <= t {
                 return;
             }
             (t, front) = (to, back);

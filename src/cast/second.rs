@@ -61,7 +61,7 @@ pub(crate) fn render(frame: &Frame, two: &Two, transfer: &TransferFunction) -> (
     draw(frame, |i, j| {
         let mut ray = Ray { frame, two, scratch: Scratch::default(), light: Light::none() };
         let steps = ray.trace(i, j, &seen);
-        let Light { color: [r, g, b], through } = ray.light;
+        let Light { color: [r, g, b], transmittance: through } = ray.light;
         ([r, g, b, 1.0 - through], [steps, ray.scratch.panels])
     })
 }
@@ -92,7 +92,7 @@ impl Ray<'_> {
                 let place = (origin + ray.direction * t) * volume.scale;
                 self.voxel(at, [p, q], place, ray.direction, (to - t) * volume.scale);
             }
-            if self.light.through < least { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            if self.light.transmittance < least { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
         steps
     }

@@ -2,12 +2,12 @@
 
 use super::reconstruction::Order;
 use crate::error::{Error, Result};
-use crate::field::Normal;
-use crate::integral::{Exact, Form, Lookup};
+use crate::field::Normalization;
+use crate::integral::{Exact, Form, PreintegratedTable};
 
 /// A table, and what makes its values of a field's.
 pub(crate) struct Tabulated<'a> {
-    lookup: &'a Lookup,
+    lookup: &'a PreintegratedTable,
     /// From values as the caster has them to those of the table: times the first, plus the second.
     map: [f64; 2],
     /// The function over the table's values, for those beyond them.
@@ -50,7 +50,12 @@ pub(crate) fn check(form: Form, order: Order, even: bool) -> Result<()> {
 
 impl<'a> Tabulated<'a> {
     /// `lookup`, of the function `exact` over values that `of_table` maps, read with samples that `own` maps.
-    pub(crate) fn new(lookup: &'a Lookup, exact: &'a Exact<f64>, [own, of_table]: [Normal; 2], order: Order) -> Self {
+    pub(crate) fn new(
+        lookup: &'a PreintegratedTable,
+        exact: &'a Exact<f64>,
+        [own, of_table]: [Normalization; 2],
+        order: Order,
+    ) -> Self {
         let map = [own.half / of_table.half, (own.mid - of_table.mid) / of_table.half];
         Tabulated { lookup, map, exact, order }
     }
@@ -66,7 +71,7 @@ impl<'a> Tabulated<'a> {
             (_, 0) => [front, f64::midpoint(front, middle), middle],
             _ => [middle, f64::midpoint(middle, back), back],
         };
-        let one = self.lookup.choice().form == Form::SecondOrder;
+        let one = self.lookup.options().form == Form::SecondOrder;
         if one && length < self.lookup.longest() * (1.0 - SHORTER) || !samples.iter().all(|s| s.is_finite()) {
             return [0.0; 4];
         }

@@ -1,7 +1,7 @@
 //! A grid as the caster reads it: axes that ascend, what is left out, and what blocks of voxels hold.
 
 use crate::error::{Error, Result};
-use crate::field::{Association, Field, Normal};
+use crate::field::{Association, Field, Normalization};
 use crate::grid::Grid;
 use crate::mesh::{Values, with_values};
 use glam::{DMat3, DVec3};
@@ -127,7 +127,7 @@ pub(crate) struct Samples {
     pub(super) values: Arc<Values>,
     pub(super) components: usize,
     pub(super) of_cells: bool,
-    pub(super) normal: [Normal; 4],
+    pub(super) normal: [Normalization; 4],
     /// What stands for values that are not finite, normalised: all over their voxels.
     pub(super) missing: Option<f64>,
     /// Points along x, and in a layer of x and y: what corners of a voxel are apart.
@@ -222,7 +222,7 @@ impl Samples {
         let n = self.components;
         let first = p * n + k;
         let at = [0, n, row * n, (row + 1) * n, layer * n, (layer + 1) * n, (layer + row) * n, (layer + row + 1) * n];
-        let Normal { mid, half } = self.normal[k];
+        let Normalization { mid, half } = self.normal[k];
         let factor = 1.0 / half;
         #[allow(clippy::unnecessary_cast, clippy::cast_lossless, reason = "one cast for ten types")]
         let raw: [f64; 8] = with_values!(&*self.values, v => {

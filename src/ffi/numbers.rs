@@ -12,8 +12,9 @@ pub(super) fn cast<'a, T: bytemuck::Pod>(numbers: &Numbers<'a>) -> Result<&'a [T
     if numbers.bytes.is_empty() {
         return Ok(&[]);
     }
-    bytemuck::try_cast_slice(numbers.bytes)
-        .map_err(|e| Error::Mesh(format!("numbers that are not where they may be: {e}")))
+    bytemuck::try_cast_slice(numbers.bytes).map_err(|e| {
+        Error::Mesh(format!("the address or the size of an array does not fit the type of its numbers: {e}"))
+    })
 }
 
 /// Bytes of one number.

@@ -4,7 +4,7 @@
 //! of cells outside the face there (the winding number of the boundary): none, or one that touches it, or one that it
 //! lies in.
 
-use super::Geometry;
+use super::TetMesh;
 use super::boundary::LEAF;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -32,7 +32,7 @@ pub struct Contacts {
 
 impl Contacts {
     /// Looks at the boundary of a mesh, on the current rayon pool.
-    pub fn new(geometry: &Geometry) -> Self {
+    pub fn new(geometry: &TetMesh) -> Self {
         let count = geometry.boundary.faces.len();
         let step = count.div_ceil(MOST).max(1);
         let one = |face: usize| match contact(geometry, face * step) {
@@ -54,7 +54,7 @@ enum Contact {
     Overlaps,
 }
 
-fn contact(geometry: &Geometry, face: usize) -> Contact {
+fn contact(geometry: &TetMesh, face: usize) -> Contact {
     let (faces, points) = (&geometry.boundary.faces, &geometry.points);
     let corners = |f: usize| faces[f].points.map(|p| points[p as usize]);
     let own @ [a, b, c] = corners(face);
@@ -98,7 +98,7 @@ fn contact(geometry: &Geometry, face: usize) -> Contact {
 }
 
 /// Calls `found` with each face whose box the line from `origin` on meets, or that is as near as `near` behind it.
-fn for_each_on_line(geometry: &Geometry, origin: DVec3, direction: DVec3, near: f64, mut found: impl FnMut(usize)) {
+fn for_each_on_line(geometry: &TetMesh, origin: DVec3, direction: DVec3, near: f64, mut found: impl FnMut(usize)) {
     let (boxes, faces) = (geometry.boundary.boxes(), &geometry.boundary.faces);
     let (inverse, first_leaf) = (direction.recip(), boxes.len() / 2);
     let mut stack = vec![0];

@@ -1,12 +1,12 @@
 //! The mesh's arrays as shaders of all engines read them.
 
 use super::buffers::Chunks;
+use super::shader::ShaderArray;
 use super::{Gpu, rays};
 use crate::error::Result;
-use crate::geometry::{Geometry, Values};
+use crate::geometry::{TetMesh, Values};
 
-/// An element of [`points`]: each coordinate is the sum of two. They are read in pairs, as devices in software take
-/// each read for itself.
+/// An element of [`points`]: each coordinate is the sum of two.
 pub(crate) const POINT: &str = "\
 struct Point { xy: vec2f, z_and_low_x: vec2f, low_yz: vec2f }
 fn high_of(p: Point) -> vec3f { return vec3f(p.xy, p.z_and_low_x.x); }
@@ -20,9 +20,9 @@ pub(crate) const INVISIBLE: f32 = 3e38;
 ///
 /// # Errors
 /// Those of [`Chunks::new`].
-pub(crate) fn points(gpu: &Gpu, geometry: &Geometry) -> Result<Chunks> {
+pub(crate) fn points(gpu: &Gpu, geometry: &TetMesh) -> Result<Chunks> {
     Chunks::new(gpu, "points", &geometry.points, |&p| {
-        let [[x, y, z], [x_low, y_low, z_low]] = rays::twice(p);
+        let [[x, y, z], [x_low, y_low, z_low]] = rays::double_single(p);
         [x, y, z, x_low, y_low, z_low]
     })
 }
@@ -38,6 +38,17 @@ pub(crate) fn values<const N: usize>(gpu: &Gpu, values: &Values<N>) -> Result<Ch
     };
     let finite = |v: &[f32; N]| v.map(|v| if v.is_finite() { v } else { INVISIBLE });
     Chunks::new(gpu, "values", all, finite)
+}
+
+/// `chunks` as shaders see them, by the names of the arrays and of their elements.
+pub(crate) fn named<const N: usize>(
+    names: [(&'static str, &'static str); N],
+    chunks: [&Chunks; N],
+) -> [ShaderArray; N] {
+    std::array::from_fn(|i| {
+        let (name, element) = names[i];
+        ShaderArray { name, element, chunks: chunks[i].buffers.len(), shift: chunks[i].shift }
+    })
 }
 
 /// What the shaders call their way of looking values up.

@@ -1,15 +1,15 @@
 //! Pre-integrated tables, built on a device: the same texels as `integral::table` has, in `shaders/construct.wgsl`.
 //!
-//! A `Plan` says what is dispatched for a table; `Builder` does it, and leaves the texels on the device. What draws
-//! copies them into its texture there (`table`), and [`Constructor`] hands them back, to be judged.
+//! A `Plan` says what is dispatched for a table; `TableBuilder` does it, and leaves the texels on the device. What draws
+//! copies them into its texture there (`table`), and [`Constructor`] hands them back, to be compared.
 
 use super::buffers::Buffer;
 use super::raster::{self, Readback, Slot};
-use super::shader::{self, Variant};
+use super::shader::{self, ShaderVariant};
 use super::{DeviceChoice, Gpu, function};
 use crate::error::Result;
-use crate::field::{self, Normal};
-use crate::integral::lookup::Stored;
+use crate::field::{self, Normalization};
+use crate::integral::lookup::TableData;
 use crate::integral::table::{
     Cylindrical, Kind, Nodes, OPAQUE_DEPTH, Polynomial, Sampling, Steps, THINNEST, Table, length,
 };
@@ -38,10 +38,10 @@ pub enum Construction {
     Incremental,
 }
 
-/// `Job` in the shader.
+/// `BuildJob` in the shader.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
-struct Job {
+struct BuildJob {
     size: u32,
     slices: u32,
     first: u32,
@@ -68,7 +68,7 @@ const LONGER: usize = 4;
 const CYLINDER: usize = 5;
 
 /// One dispatch: which pipeline, with what, and how many groups.
-type Dispatch = (usize, Job, [u32; 3]);
+type Dispatch = (usize, BuildJob, [u32; 3]);
 
 /// What builds a table.
 struct Plan {
@@ -80,9 +80,9 @@ struct Plan {
     rows: [u32; 2],
 }
 
-impl Job {
+impl BuildJob {
     fn new(size: u32, slices: u32, longest: f64, lengths: impl Iterator<Item = f64>) -> Self {
-        let mut job = Job { size, slices, longest: longest as f32, ..Job::zeroed() };
+        let mut job = BuildJob { size, slices, longest: longest as f32, ..BuildJob::zeroed() };
         job.lengths.iter_mut().zip(lengths).for_each(|(to, l)| *to = l as f32);
         // Lengths of polynomials do not begin with 0.
         let thinnest = if job.lengths[0] > 0.0 { longest * THINNEST } else { f64::from(job.lengths[1]) };
@@ -110,9 +110,9 @@ impl Plan {
         if n != h || n < 3 || slices < 3 || slices as usize > MOST_SLICES {
             return None;
         }
-        let mut job = Job::new(n, slices, longest, (0..slices).map(|k| length(kind, slices, longest, k)));
+        let mut job = BuildJob::new(n, slices, longest, (0..slices).map(|k| length(kind, slices, longest, k)));
         job.normalised = u32::from(normalised);
-        let closed = |job: Job, first: u32, count: u32| (CLOSED, job.from(first), [n.div_ceil(64), count, 1]);
+        let closed = |job: BuildJob, first: u32, count: u32| (CLOSED, job.from(first), [n.div_ceil(64), count, 1]);
         let mut list = vec![];
         let dispatches: Vec<Dispatch> = match construction {
             Construction::Closed => vec![closed(job, 0, slices)],
@@ -144,7 +144,7 @@ impl Plan {
             return None;
         }
         let lengths = (1..=degree).map(|i| longest * f64::from(i) / f64::from(degree));
-        let mut job = Job::new(size, degree, longest, lengths);
+        let mut job = BuildJob::new(size, degree, longest, lengths);
         (job.degree, job.normalised) = (degree, 1);
         for (row, of) in job.weights.iter_mut().zip(table::inverse(degree as usize)) {
             row.iter_mut().zip(of).for_each(|(w, of)| *w = of as f32);
@@ -159,18 +159,18 @@ impl Plan {
         if planes == 0 || !planes.is_multiple_of(4) || planes > 65_535 || size < 3 {
             return None;
         }
-        let job = Job::new(size, planes, longest, std::iter::empty());
+        let job = BuildJob::new(size, planes, longest, std::iter::empty());
         let dispatches = vec![(CYLINDER, job, [size.div_ceil(64), planes, 1])];
         Some(Plan { size, list: vec![], dispatches, rows: [planes * size, 0] })
     }
 
     /// What builds `stored`, whatever its texels are now.
-    fn of(exact: &Exact<f64>, stored: &Stored) -> Option<Self> {
+    fn of(exact: &Exact<f64>, stored: &TableData) -> Option<Self> {
         match stored {
-            Stored::Volume(t) => Plan::volume(exact, t.kind, t.size, t.longest, Construction::Closed),
-            Stored::Polynomial(t) => Plan::polynomial(t.degree, t.size, t.longest),
-            Stored::Cylindrical(t) => Plan::cylindrical(t.planes, t.size, t.longest),
-            Stored::SecondOrder(_) | Stored::SecondOrderPolynomial(_) => None,
+            TableData::Volume(t) => Plan::volume(exact, t.kind, t.size, t.longest, Construction::Closed),
+            TableData::Polynomial(t) => Plan::polynomial(t.degree, t.size, t.longest),
+            TableData::Cylindrical(t) => Plan::cylindrical(t.planes, t.size, t.longest),
+            TableData::SecondOrder(_) | TableData::SecondOrderPolynomial(_) => None,
         }
     }
 }
@@ -185,13 +185,13 @@ pub(crate) struct Texels {
 
 /// The pipelines that build tables, for one kind of emission.
 #[derive(Debug)]
-pub(crate) struct Builder {
+pub(crate) struct TableBuilder {
     direct: bool,
     layouts: [wgpu::BindGroupLayout; 2],
     pipelines: [wgpu::ComputePipeline; 6],
 }
 
-impl Builder {
+impl TableBuilder {
     /// Compiles them.
     ///
     /// # Errors
@@ -206,7 +206,7 @@ impl Builder {
         let layout = raster::pipeline_layout(gpu, &layouts.each_ref().map(Some));
         let pipelines = ENTRIES.map(|entry| raster::compute(gpu, &module, entry, &layout));
         gpu.check()?;
-        Ok(Builder { direct, layouts, pipelines })
+        Ok(TableBuilder { direct, layouts, pipelines })
     }
 
     /// Whether they are those for `exact`.
@@ -224,7 +224,7 @@ impl Builder {
         gpu: &Gpu,
         exact: &Exact<f64>,
         function: &[Buffer; 3],
-        stored: &Stored,
+        stored: &TableData,
     ) -> Result<Option<Texels>> {
         let Some(plan) = Plan::of(exact, stored) else { return Ok(None) };
         let pitch = plan.size.next_multiple_of(ROW);
@@ -252,13 +252,13 @@ impl Builder {
         ];
         let texels = Buffer::new(gpu, "texels", bytes[0], Usage::STORAGE | Usage::COPY_SRC)?;
         let result = Buffer::new(gpu, "result", bytes[1], Usage::STORAGE | Usage::COPY_SRC)?;
-        let shared = raster::group(gpu, &self.layouts[0], function.iter().map(|b| b.raw.as_entire_binding()));
+        let shared = raster::group_of(gpu, &self.layouts[0], function);
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let mut jobs = vec![];
         for (pipeline, job, [x, y, z]) in &plan.dispatches {
-            let job = Buffer::holding(gpu, "job", &[Job { pitch, ..*job }], Usage::UNIFORM)?;
+            let job = Buffer::holding(gpu, "job", &[BuildJob { pitch, ..*job }], Usage::UNIFORM)?;
             let all = std::iter::once(&job).chain(&uploaded).chain([&texels, &result]);
-            let group = raster::group(gpu, &self.layouts[1], all.map(|b| b.raw.as_entire_binding()));
+            let group = raster::group_of(gpu, &self.layouts[1], all);
             let mut pass = encoder.begin_compute_pass(&Default::default());
             pass.set_pipeline(&self.pipelines[*pipeline]);
             pass.set_bind_group(0, &shared, &[]);
@@ -276,14 +276,14 @@ impl Builder {
 }
 
 fn source(direct: bool) -> String {
-    let variant = Variant { kind: field::Kind::Scalar, direct };
+    let variant = ShaderVariant { kind: field::Kind::Scalar, direct };
     [&shader::prelude(&variant), shader::INTEGRAL, CONSTRUCT].concat()
 }
 
 /// A device that builds tables of one function.
 pub struct Constructor {
     gpu: Gpu,
-    builder: Builder,
+    builder: TableBuilder,
     function: [Buffer; 3],
     exact: Exact<f64>,
 }
@@ -298,12 +298,12 @@ impl Constructor {
     pub fn open(
         choice: &DeviceChoice,
         transfer: &TransferFunction,
-        normal: &[Normal; 4],
+        normal: &[Normalization; 4],
         scale: f64,
     ) -> Result<Option<Self>> {
         let Some(gpu) = Gpu::open(choice)? else { return Ok(None) };
         let exact = Exact::<f64>::new(transfer, field::Kind::Scalar, normal, scale);
-        let builder = Builder::new(&gpu, exact.direct)?;
+        let builder = TableBuilder::new(&gpu, exact.direct)?;
         let function = function::upload(&gpu, &Exact::<f32>::new(transfer, field::Kind::Scalar, normal, scale))?;
         Ok(Some(Constructor { gpu, builder, function, exact }))
     }
@@ -383,18 +383,18 @@ mod tests {
     use crate::integral::table::tests::{apart_texels, transfers};
     use wgpu::naga;
 
-    const NORMAL: [Normal; 4] = [Normal { mid: 0.0, half: 1.0 }; 4];
+    const NORMAL: [Normalization; 4] = [Normalization { mid: 0.0, half: 1.0 }; 4];
 
     #[test]
     fn jobs_are_laid_out_as_the_shader_has_them() {
         for direct in [false, true] {
             let module = testing::validated(&source(direct));
-            let (_, job) = module.types.iter().find(|(_, t)| t.name.as_deref() == Some("Job")).unwrap();
+            let (_, job) = module.types.iter().find(|(_, t)| t.name.as_deref() == Some("BuildJob")).unwrap();
             let naga::TypeInner::Struct { span, members } = &job.inner else { panic!("no struct") };
-            assert_eq!(*span as usize, size_of::<Job>());
+            assert_eq!(*span as usize, size_of::<BuildJob>());
             let got: Vec<_> = members.iter().map(|m| (m.name.as_deref().unwrap(), m.offset as usize)).collect();
             macro_rules! offsets {
-                ($($field:ident),*) => { [$((stringify!($field), std::mem::offset_of!(Job, $field))),*] };
+                ($($field:ident),*) => { [$((stringify!($field), std::mem::offset_of!(BuildJob, $field))),*] };
             }
             let want = offsets!(
                 size,

@@ -34,7 +34,9 @@ impl Texture {
         if size.iter().any(|&n| n > most) {
             let ([w, h, d], name) = (size, &gpu.adapter.name);
             let size = if is_solid { format!("{w}x{h}x{d}") } else { format!("{w}x{h}") };
-            return Err(Error::Device(format!("{name} has no {label} of {size} pixels, but of {most} at most")));
+            return Err(Error::Device(format!(
+                "{label}: {size} pixels are too many for {name}, which has {most} at most along each side"
+            )));
         }
         let texel = u64::from(format.block_copy_size(None).unwrap_or(16));
         let bytes = size.iter().fold(texel, |n, &s| n * u64::from(s));
@@ -182,6 +184,15 @@ pub(crate) fn group<'a>(
     let entries: Vec<_> =
         (0..).zip(resources).map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
     gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries })
+}
+
+/// A group of whole buffers, bound from 0 on.
+pub(crate) fn group_of<'a>(
+    gpu: &Gpu,
+    layout: &wgpu::BindGroupLayout,
+    buffers: impl IntoIterator<Item = &'a Buffer>,
+) -> wgpu::BindGroup {
+    group(gpu, layout, buffers.into_iter().map(|b| b.raw.as_entire_binding()))
 }
 
 pub(crate) fn pipeline_layout(gpu: &Gpu, layouts: &[Option<&wgpu::BindGroupLayout>]) -> wgpu::PipelineLayout {

@@ -1,6 +1,6 @@
 //! A view's rays, and what limits them, as shaders of all engines read them: in normalised coordinates.
 
-use crate::geometry::Geometry;
+use crate::geometry::TetMesh;
 use crate::view::{ClippingPlane, Fan, View};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -14,7 +14,7 @@ pub(crate) fn limit(t: f64) -> f32 {
 }
 
 /// `v` as a sum of two vectors of f32.
-pub(crate) fn twice(v: DVec3) -> [[f32; 3]; 2] {
+pub(crate) fn double_single(v: DVec3) -> [[f32; 3]; 2] {
     let high = v.as_vec3();
     [high, (v - high.as_dvec3()).as_vec3()].map(|v| v.to_array())
 }
@@ -26,11 +26,11 @@ pub(crate) fn affine([first, by_column, by_row]: [DVec3; 3]) -> [[[f32; 4]; 2]; 
         let low = (v - DVec3::from(high.map(f64::from))).as_vec3();
         [[high[0], high[1], high[2], 0.0], low.extend(0.0).to_array()]
     };
-    [twice(first).map(|[x, y, z]| [x, y, z, 0.0]), short(by_column), short(by_row)]
+    [double_single(first).map(|[x, y, z]| [x, y, z, 0.0]), short(by_column), short(by_row)]
 }
 
 /// Clipping planes: dot(p, plane.xyz) + plane.w ≥ 0 is kept of what is at `p` from `base`.
-pub(crate) fn planes(view: &View, geometry: &Geometry, base: DVec3) -> Vec<[f32; 4]> {
+pub(crate) fn planes(view: &View, geometry: &TetMesh, base: DVec3) -> Vec<[f32; 4]> {
     let plane = |p: &ClippingPlane| {
         let normal = (p.normal / p.normal.abs().max_element()).normalize();
         let height = normal.dot((geometry.centre - p.origin) * geometry.scale + base);

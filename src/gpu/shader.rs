@@ -1,8 +1,7 @@
 //! Shader assembly: fragments of WGSL joined into programs, after a prelude of what Rust knows.
 
-use super::Gpu;
 use crate::field::Kind;
-use crate::integral::{BUCKETS, DEEP, MILD, OPAQUE_EXTINCTION};
+use crate::integral::{BUCKETS, OPAQUE_DEPTH, OPAQUE_EXTINCTION, SERIES_DEPTH};
 use std::fmt::Write;
 
 pub(crate) const CELL: &str = include_str!("../../shaders/cell.wgsl");
@@ -10,7 +9,7 @@ pub(crate) const INTEGRAL: &str = include_str!("../../shaders/integral.wgsl");
 
 /// What a program is compiled for.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Variant {
+pub(crate) struct ShaderVariant {
     /// The field's values.
     pub(crate) kind: Kind,
     /// Emission is not multiplied by extinction.
@@ -19,7 +18,7 @@ pub(crate) struct Variant {
 
 /// An array of the mesh's size, as a shader sees it: `name(i)` is its element i.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Array {
+pub(crate) struct ShaderArray {
     pub(crate) name: &'static str,
     pub(crate) element: &'static str,
     /// Number of bindings that it is spread over, and the logarithm of the elements in each.
@@ -28,11 +27,12 @@ pub(crate) struct Array {
 }
 
 /// Constants of the integral, and what differs between the kinds of fields.
-pub(crate) fn prelude(variant: &Variant) -> String {
+pub(crate) fn prelude(variant: &ShaderVariant) -> String {
     let mut text = String::new();
     let number = |x: f64| format!("{x:?}f");
     let mut constant = |name: &str, value: String| text += &format!("const {name} = {value};\n");
-    for (name, value) in [("DEEP", DEEP), ("MILD", MILD), ("OPAQUE", OPAQUE_EXTINCTION)] {
+    for (name, value) in [("OPAQUE_DEPTH", OPAQUE_DEPTH), ("SERIES_DEPTH", SERIES_DEPTH), ("OPAQUE", OPAQUE_EXTINCTION)]
+    {
         constant(name, number(value));
     }
     // Four units in the last place, as in cell.rs; and what is as good as 0 but far above the smallest f32.
@@ -61,9 +61,9 @@ pub(crate) fn prelude(variant: &Variant) -> String {
 }
 
 /// Bindings of `arrays` in group 1, and the functions that look elements up in them.
-pub(crate) fn accessors(arrays: &[Array]) -> String {
+pub(crate) fn accessors(arrays: &[ShaderArray]) -> String {
     let (mut text, mut binding) = (String::new(), 0);
-    for Array { name, element, chunks, shift } in arrays {
+    for ShaderArray { name, element, chunks, shift } in arrays {
         for c in 0..*chunks {
             let place = format!("@group(1) @binding({binding})");
             text += &format!("{place} var<storage, read> {name}_{c}: array<{element}>;\n");
@@ -82,77 +82,4 @@ pub(crate) fn accessors(arrays: &[Array]) -> String {
         }
     }
     text
-}
-
-/// Compiles a program whose entry point is "main".
-pub(crate) fn compile(
-    gpu: &Gpu,
-    label: &str,
-    source: &str,
-    layouts: &[&wgpu::BindGroupLayout],
-) -> wgpu::ComputePipeline {
-    let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some(label),
-        source: wgpu::ShaderSource::Wgsl(source.into()),
-    });
-    let layouts: Vec<_> = layouts.iter().map(|l| Some(*l)).collect();
-    let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some(label),
-        bind_group_layouts: &layouts,
-        immediate_size: 0,
-    });
-    gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: Some(label),
-        layout: Some(&layout),
-        module: &module,
-        entry_point: Some("main"),
-        compilation_options: wgpu::PipelineCompilationOptions {
-            zero_initialize_workgroup_memory: false,
-            ..Default::default()
-        },
-        cache: None,
-    })
-}
-
-/// What one binding of a compute shader is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Binding {
-    Uniform,
-    Read,
-    Write,
-}
-
-/// The layout of a group whose bindings are numbered from 0.
-pub(crate) fn group_layout(gpu: &Gpu, bindings: &[Binding]) -> wgpu::BindGroupLayout {
-    let entries: Vec<_> = (0..)
-        .zip(bindings)
-        .map(|(binding, kind)| wgpu::BindGroupLayoutEntry {
-            binding,
-            visibility: wgpu::ShaderStages::COMPUTE,
-            ty: wgpu::BindingType::Buffer {
-                ty: match kind {
-                    Binding::Uniform => wgpu::BufferBindingType::Uniform,
-                    Binding::Read => wgpu::BufferBindingType::Storage { read_only: true },
-                    Binding::Write => wgpu::BufferBindingType::Storage { read_only: false },
-                },
-                has_dynamic_offset: false,
-                min_binding_size: None,
-            },
-            count: None,
-        })
-        .collect();
-    gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: None, entries: &entries })
-}
-
-/// A group of whole buffers, bound from 0 on.
-pub(crate) fn group<'a>(
-    gpu: &Gpu,
-    layout: &wgpu::BindGroupLayout,
-    buffers: impl IntoIterator<Item = &'a super::buffers::Buffer>,
-) -> wgpu::BindGroup {
-    let entries: Vec<_> = (0..)
-        .zip(buffers)
-        .map(|(binding, b)| wgpu::BindGroupEntry { binding, resource: b.raw.as_entire_binding() })
-        .collect();
-    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries })
 }

@@ -17,10 +17,10 @@ const PASSES: u32 = 8;
 
 const MOST_GROUPS: u32 = 65_535;
 
-/// `Pass` in the shader.
+/// `SortPass` in the shader.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
-struct Pass {
+struct SortPass {
     items: u32,
     shift: u32,
     blocks: u32,
@@ -72,7 +72,7 @@ impl Sorter {
         // An even number of passes: what the first writes to is the other pair, the last writes the order.
         let passes = (0..PASSES)
             .map(|p| {
-                let pass = Pass { items: items as u32, shift: 4 * p, blocks, is_first: u32::from(p == 0), row };
+                let pass = SortPass { items: items as u32, shift: 4 * p, blocks, is_first: u32::from(p == 0), row };
                 Buffer::holding(gpu, "pass", &[pass], Usage::UNIFORM)
             })
             .collect::<Result<Vec<_>>>()?;
@@ -81,7 +81,7 @@ impl Sorter {
             let (from, to) = ([keys, &numbers], [&other_keys, &other_numbers]);
             let (from, to) = if p % 2 == 0 { (from, to) } else { (to, from) };
             let all = [pass, from[0], from[1], to[0], to[1], &counts, &total];
-            let group = raster::group(gpu, &self.layout, all.into_iter().map(|b| b.raw.as_entire_binding()));
+            let group = raster::group_of(gpu, &self.layout, all);
             for (k, pipeline) in self.pipelines.iter().enumerate() {
                 let mut pass = encoder.begin_compute_pass(&Default::default());
                 pass.set_pipeline(pipeline);

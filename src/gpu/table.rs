@@ -2,13 +2,13 @@
 
 use super::Gpu;
 use super::buffers::Buffer;
-use super::construct::{Builder, Texels as BuiltTexels};
+use super::construct::{TableBuilder, Texels as BuiltTexels};
 use super::raster::{Slot, Texture};
 use crate::error::{Error, Result};
-use crate::integral::choice::{Alpha, Build, Choice, Form, Planes, Texels};
-use crate::integral::lookup::{Range, Stored};
+use crate::integral::lookup::{Range, TableData};
+use crate::integral::options::{Alpha, Build, Form, IntegrationOptions, Planes, Texels};
 use crate::integral::table::{Cylindrical, Kind, length};
-use crate::integral::{Exact, Lookup};
+use crate::integral::{Exact, PreintegratedTable};
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
 use wgpu::{BufferUsages as Usage, TextureDimension, TextureFormat, TextureUsages};
@@ -40,25 +40,25 @@ pub(crate) fn declarations(group: u32, first: u32) -> String {
 
 /// The constants that a program with this table is compiled for; `per_cell` if a cylinder's planes are known from the
 /// cell.
-pub(crate) fn constants(table: Option<&Lookup>, per_cell: bool) -> String {
+pub(crate) fn constants(table: Option<&PreintegratedTable>, per_cell: bool) -> String {
     let mut text = String::new();
     let forms = ["EXACT", "UNIFORM", "LOG", "LOG_NORMALISED", "POLYNOMIAL", "CYLINDRICAL"];
     for (i, form) in forms.iter().enumerate() {
         text += &format!("const {form} = {i}u;\n");
     }
-    let form = match table.map(Lookup::stored) {
+    let form = match table.map(PreintegratedTable::stored) {
         None => "EXACT",
-        Some(Stored::Volume(t)) => match t.kind {
+        Some(TableData::Volume(t)) => match t.kind {
             Kind::Uniform => "UNIFORM",
             Kind::Log => "LOG",
             Kind::LogNormalised => "LOG_NORMALISED",
         },
-        Some(Stored::Polynomial(_)) => "POLYNOMIAL",
-        Some(Stored::Cylindrical(_)) => "CYLINDRICAL",
+        Some(TableData::Polynomial(_)) => "POLYNOMIAL",
+        Some(TableData::Cylindrical(_)) => "CYLINDRICAL",
         // Devices have no slabs of three samples yet, and refuse their tables.
-        Some(Stored::SecondOrder(_) | Stored::SecondOrderPolynomial(_)) => "EXACT",
+        Some(TableData::SecondOrder(_) | TableData::SecondOrderPolynomial(_)) => "EXACT",
     };
-    let choice = table.map(|t| *t.choice()).unwrap_or_default();
+    let choice = table.map(|t| *t.options()).unwrap_or_default();
     text += &format!(
         "const COLORING = {form};\nconst DEGREE = {}u;\nconst LINEAR_OPACITY = {};\nconst ONE_PLANE = {};\nconst PACKED = {};\n\
          const PLANE_PER_CELL = {};\n",
@@ -92,19 +92,24 @@ pub(crate) struct OnDevice {
 
 /// The table that a device holds, and its twin on the host.
 #[derive(Debug, Default)]
-pub(crate) struct Held {
-    table: Option<(Option<Arc<Lookup>>, OnDevice)>,
-    builder: Option<Builder>,
+pub(crate) struct TableCache {
+    table: Option<(Option<Arc<PreintegratedTable>>, OnDevice)>,
+    builder: Option<TableBuilder>,
 }
 
-impl Held {
+impl TableCache {
     /// Hands over `table` unless it is there, or has the device build it of the function that `function` tells; without
     /// one, the smallest that can be bound.
     ///
     /// # Errors
     /// Those of [`OnDevice::holding`] and [`OnDevice::building`].
-    pub(crate) fn prepare(&mut self, gpu: &Gpu, table: Option<&Arc<Lookup>>, function: &[Buffer; 3]) -> Result<()> {
-        let same = |(held, _): &(Option<Arc<Lookup>>, OnDevice)| match (held, table) {
+    pub(crate) fn prepare(
+        &mut self,
+        gpu: &Gpu,
+        table: Option<&Arc<PreintegratedTable>>,
+        function: &[Buffer; 3],
+    ) -> Result<()> {
+        let same = |(held, _): &(Option<Arc<PreintegratedTable>>, OnDevice)| match (held, table) {
             (Some(a), Some(b)) => Arc::ptr_eq(a, b),
             (None, None) => true,
             _ => false,
@@ -118,7 +123,7 @@ impl Held {
                 Some((table, Some(exact))) => {
                     let builder = match self.builder.take().filter(|b| b.suits(exact)) {
                         Some(builder) => builder,
-                        None => Builder::new(gpu, exact.direct)?,
+                        None => TableBuilder::new(gpu, exact.direct)?,
                     };
                     OnDevice::building(gpu, table, exact, self.builder.insert(builder), function)?
                 }
@@ -139,9 +144,9 @@ fn no_slabs() -> Error {
 }
 
 /// Whether `gpu` is to build the tables of `choice` itself, rather than be handed them.
-pub(crate) fn builds(gpu: &Gpu, choice: &Choice) -> bool {
+pub(crate) fn builds(gpu: &Gpu, choice: &IntegrationOptions) -> bool {
     let wanted = match choice.build {
-        Build::Auto => gpu.adapter.kind != "CPU",
+        Build::Auto => !gpu.adapter.is_software(),
         Build::Host => false,
         Build::Device => true,
     };
@@ -178,31 +183,31 @@ impl OnDevice {
     /// # Errors
     /// [`Error::Device`] if the device does not filter such texels or has no textures so large, and those of
     /// [`Gpu::check`] and [`Buffer::new`].
-    pub(crate) fn holding(gpu: &Gpu, table: &Lookup) -> Result<Self> {
-        let format = texel_format(gpu, table.choice().texels)?;
+    pub(crate) fn holding(gpu: &Gpu, table: &PreintegratedTable) -> Result<Self> {
+        let format = texel_format(gpu, table.options().texels)?;
         let on_device = Self::empty(gpu, table, format)?;
         let (OnDevice { volume, layers: (layers, _), .. }, ranges) = (&on_device, table.ranges());
         let mut writer = Writer { gpu, format, pending: 0 };
         match table.stored() {
-            Stored::Volume(t) => {
+            TableData::Volume(t) => {
                 let [w, h, _] = t.size;
                 for (z, slice) in (0..).zip(t.texels.chunks((w * h) as usize)) {
                     writer.write(volume, [0, 0, z], [w, h], slice, &ranges[0])?;
                 }
             }
-            Stored::Polynomial(t) => {
+            TableData::Polynomial(t) => {
                 for (power, (texels, range)) in (0..).zip(t.texels.iter().zip(ranges)) {
                     writer.write(layers, [0, 0, power], [t.size; 2], texels, range)?;
                 }
             }
-            Stored::Cylindrical(t) => {
-                let tiles = Tiles::new(gpu, t, table.choice().planes == Planes::Packed);
+            TableData::Cylindrical(t) => {
+                let tiles = Tiles::new(gpu, t, table.options().planes == Planes::Packed);
                 for tile in 0..tiles.count {
                     let texels = tiles.texels(t, tile);
                     writer.write(layers, tiles.corner(tile), tiles.tile, &texels, &ranges[0])?;
                 }
             }
-            Stored::SecondOrder(_) | Stored::SecondOrderPolynomial(_) => return Err(no_slabs()),
+            TableData::SecondOrder(_) | TableData::SecondOrderPolynomial(_) => return Err(no_slabs()),
         }
         Ok(on_device)
     }
@@ -214,9 +219,9 @@ impl OnDevice {
     /// [`Error::Device`] if it cannot build such a table or has no bindings so large, and those of [`Self::holding`].
     pub(crate) fn building(
         gpu: &Gpu,
-        table: &Lookup,
+        table: &PreintegratedTable,
         exact: &Exact<f64>,
-        builder: &Builder,
+        builder: &TableBuilder,
         function: &[Buffer; 3],
     ) -> Result<Self> {
         let on_device = Self::empty(gpu, table, texel_format(gpu, Texels::Float)?)?;
@@ -227,15 +232,15 @@ impl OnDevice {
         };
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         match table.stored() {
-            Stored::Volume(_) => copy(&mut encoder, &built, 0, volume, [0; 3], [w, h, depth]),
-            Stored::Polynomial(_) => copy(&mut encoder, &built, 0, layers, [0; 3], [w, h, depth]),
-            Stored::Cylindrical(t) => {
+            TableData::Volume(_) => copy(&mut encoder, &built, 0, volume, [0; 3], [w, h, depth]),
+            TableData::Polynomial(_) => copy(&mut encoder, &built, 0, layers, [0; 3], [w, h, depth]),
+            TableData::Cylindrical(t) => {
                 let tiles = Tiles::new(gpu, t, false);
                 for tile in 0..tiles.count {
                     copy(&mut encoder, &built, tile * h, layers, tiles.corner(tile), [w, h, 1]);
                 }
             }
-            Stored::SecondOrder(_) | Stored::SecondOrderPolynomial(_) => return Err(no_slabs()),
+            TableData::SecondOrder(_) | TableData::SecondOrderPolynomial(_) => return Err(no_slabs()),
         }
         gpu.queue.submit([encoder.finish()]);
         gpu.check()?;
@@ -243,7 +248,7 @@ impl OnDevice {
     }
 
     /// Textures that have room for `table`, and what shaders must know of it.
-    fn empty(gpu: &Gpu, table: &Lookup, format: TextureFormat) -> Result<Self> {
+    fn empty(gpu: &Gpu, table: &PreintegratedTable, format: TextureFormat) -> Result<Self> {
         let ([x, y, z], longest) = (table.size().map(|n| n as f32), table.longest() as f32);
         let mut parameters = Parameters { size: [x, y, z, longest], ..Parameters::zeroed() };
         for (i, range) in table.ranges().iter().enumerate().take(POWERS) {
@@ -254,20 +259,20 @@ impl OnDevice {
             Ok((texture(gpu, TextureDimension::D3, [1; 3], small)?, texture(gpu, TextureDimension::D2, size, format)?))
         };
         let (volume, layers) = match table.stored() {
-            Stored::Volume(t) => {
+            TableData::Volume(t) => {
                 if t.kind != Kind::Uniform {
                     parameters.size[3] = length(t.kind, t.size[2], t.longest, 1) as f32;
                 }
                 let volume = texture(gpu, TextureDimension::D3, t.size, format)?;
                 (volume, texture(gpu, TextureDimension::D2, [1; 3], small)?)
             }
-            Stored::Polynomial(_) => layered(table.size())?,
-            Stored::Cylindrical(t) => {
-                let tiles = Tiles::new(gpu, t, table.choice().planes == Planes::Packed);
+            TableData::Polynomial(_) => layered(table.size())?,
+            TableData::Cylindrical(t) => {
+                let tiles = Tiles::new(gpu, t, table.options().planes == Planes::Packed);
                 parameters.tiles = tiles.parameters();
                 layered(tiles.size())?
             }
-            Stored::SecondOrder(_) | Stored::SecondOrderPolynomial(_) => return Err(no_slabs()),
+            TableData::SecondOrder(_) | TableData::SecondOrderPolynomial(_) => return Err(no_slabs()),
         };
         Self::new(gpu, volume, layers, parameters)
     }

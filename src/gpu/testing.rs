@@ -1,6 +1,8 @@
 //! What tests of all engines need of a device.
 
+use super::buffers::Chunks;
 use super::{DeviceChoice, Gpu};
+use crate::error::Result;
 use wgpu::naga;
 
 /// The device to test: `HALITE_TEST_DEVICE`, or the first. Without any, tests are skipped, loudly; with
@@ -20,6 +22,11 @@ pub(crate) fn choice() -> Option<DeviceChoice> {
 
 pub(crate) fn gpu() -> Option<Gpu> {
     Gpu::open(&choice()?).unwrap()
+}
+
+/// How many bindings arrays have; none if the device does not hold them.
+pub(crate) fn bindings<const N: usize>(chunks: Result<[&Chunks; N]>) -> Vec<usize> {
+    chunks.map_or(vec![], |all| all.iter().map(|c| c.buffers.len()).collect())
 }
 
 pub(crate) fn validated(source: &str) -> naga::Module {

@@ -8,19 +8,19 @@ use tracing::dispatcher::{get_default, with_default};
 /// Lines that nobody takes are kept up to this many; then the oldest go.
 const MOST_LINES: usize = 1000;
 
-type Lines = Arc<Mutex<VecDeque<String>>>;
+type SharedLines = Arc<Mutex<VecDeque<String>>>;
 
 /// Collects what is logged in [`Log::collect`]. Clones share their lines. No subscriber that the program has set, for
 /// itself or for a thread, gets these lines, and this log gets none of theirs.
 #[derive(Debug, Clone)]
 pub struct Log {
-    lines: Lines,
+    lines: SharedLines,
     subscriber: Dispatch,
 }
 
 impl Default for Log {
     fn default() -> Self {
-        let lines = Lines::default();
+        let lines = SharedLines::default();
         let writer = Writer(Arc::clone(&lines));
         let subscriber = tracing_subscriber::fmt()
             .with_max_level(tracing::Level::INFO)
@@ -53,7 +53,7 @@ pub fn carried<T>(work: impl FnOnce() -> T) -> impl FnOnce() -> T {
 
 /// Where a subscriber writes each line at once.
 #[derive(Debug, Clone)]
-struct Writer(Lines);
+struct Writer(SharedLines);
 
 impl std::io::Write for Writer {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {

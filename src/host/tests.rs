@@ -1,7 +1,7 @@
 use super::*;
 use crate::field::{Association, Component};
 use crate::integral::Form;
-use crate::integral::choice::Texels;
+use crate::integral::options::Texels;
 use crate::integral::table::Kind;
 use crate::mesh::generate;
 use crate::view::{Camera, Projection};
@@ -147,23 +147,29 @@ fn tables_are_judged_when_they_are_asked_for_and_then_drawn() {
     let mesh = mesh();
     set(&mut session, &mesh, DMat4::IDENTITY);
     let exact = draw(&mut session);
-    let mut far_from_exact = |choice: Choice| {
+    let mut far_from_exact = |choice: IntegrationOptions| {
         session.set_integral(choice).unwrap();
         draw(&mut session).compare(&exact).unwrap().rmse
     };
-    let [first, fourth] = [1, 4].map(|degree| far_from_exact(Choice { degree, ..Choice::of(Form::Polynomial) }));
+    let [first, fourth] =
+        [1, 4].map(|degree| far_from_exact(IntegrationOptions { degree, ..IntegrationOptions::of(Form::Polynomial) }));
     assert!(fourth > 0.0 && fourth < first / 2.0, "{fourth} {first}");
     for (choice, part) in [
-        (Choice { table: Some([1, 64, 16]), ..Choice::of(Form::Volume) }, "at least 2, 2 and 3"),
-        (Choice { degree: 9, ..Choice::of(Form::Polynomial) }, "from 1 to 8, and not 9"),
-        (Choice { degree: 0, ..Choice::of(Form::Polynomial) }, "from 1 to 8, and not 0"),
+        (
+            IntegrationOptions { table: Some([1, 64, 16]), ..IntegrationOptions::of(Form::Volume) },
+            "at least 2, 2 and 3",
+        ),
+        (IntegrationOptions { degree: 9, ..IntegrationOptions::of(Form::Polynomial) }, "from 1 to 8, and not 9"),
+        (IntegrationOptions { degree: 0, ..IntegrationOptions::of(Form::Polynomial) }, "from 1 to 8, and not 0"),
     ] {
         let message = session.set_integral(choice).unwrap_err().to_string();
         assert!(message.contains(part), "{message}");
     }
     assert!(draw(&mut session).compare(&exact).unwrap().rmse <= fourth, "what is refused changes nothing");
-    session.set_integral(Choice { degree: 0, table: Some([1; 3]), ..Choice::default() }).unwrap();
-    assert_eq!(draw(&mut session), exact, "what the exact integral does not read is not judged");
+    session
+        .set_integral(IntegrationOptions { degree: 0, table: Some([1; 3]), ..IntegrationOptions::default() })
+        .unwrap();
+    assert_eq!(draw(&mut session), exact, "what the exact integral does not read is not checked");
 }
 
 #[test]

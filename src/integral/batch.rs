@@ -1,6 +1,6 @@
 //! Many pieces at a time: the same arithmetic as [`Piece::new`], in vector instructions.
 
-use super::{Exact, Light, MILD, PANEL, Piece};
+use super::{Exact, GAUSS_DEPTH, Light, Piece, SERIES_DEPTH};
 
 /// Pieces that a [`Batch`] holds.
 const BATCH: usize = 32;
@@ -69,18 +69,18 @@ impl Batch {
             // What is below 0 is rounding, much of it beside great depths.
             (*x, *y) = ((front[0] * length).max(0.0), (back[0] * length).max(0.0));
         }
-        let all_mild = x.iter().zip(&y).all(|(x, y)| x.max(*y) <= MILD as f32);
-        let moderate = match (all_mild, direct) {
-            (true, false) => many(&x, &y, self.len, |x, y| Piece::mild(x, y, false)),
-            (true, true) => many(&x, &y, self.len, |x, y| Piece::mild(x, y, true)),
-            (false, false) => many(&x, &y, self.len, |x, y| Piece::moderate(x, y, false)),
-            (false, true) => many(&x, &y, self.len, |x, y| Piece::moderate(x, y, true)),
+        let all_thin = x.iter().zip(&y).all(|(x, y)| x.max(*y) <= SERIES_DEPTH as f32);
+        let computed = match (all_thin, direct) {
+            (true, false) => many(&x, &y, self.len, |x, y| Piece::by_series(x, y, false)),
+            (true, true) => many(&x, &y, self.len, |x, y| Piece::by_series(x, y, true)),
+            (false, false) => many(&x, &y, self.len, |x, y| Piece::by_gauss(x, y, false)),
+            (false, true) => many(&x, &y, self.len, |x, y| Piece::by_gauss(x, y, true)),
         };
         for (i, ((f, b), length)) in pieces.enumerate() {
-            let piece = if x[i].max(y[i]) > PANEL as f32 {
+            let piece = if x[i].max(y[i]) > GAUSS_DEPTH as f32 {
                 Piece::new(x[i], y[i], direct)
             } else {
-                Piece { alpha: moderate[0][i], front: moderate[1][i], back: moderate[2][i] }
+                Piece { alpha: computed[0][i], front: computed[1][i], back: computed[2][i] }
             };
             let l = if direct { *length } else { 1.0 };
             light.add([1, 2, 3].map(|k| (f[k] * piece.front + b[k] * piece.back) * l), piece.alpha);

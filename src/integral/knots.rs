@@ -1,7 +1,7 @@
 //! The transfer function as the kernel reads it: knots over the normalised scalar.
 
 use super::OPAQUE_EXTINCTION;
-use crate::field::Normal;
+use crate::field::Normalization;
 use crate::real::Real;
 use crate::transfer::{Convention, OPAQUE, TransferFunction};
 
@@ -106,15 +106,6 @@ impl<R: Real> Knots<R> {
         lines
     }
 
-    /// The most lines that values which differ by up to `width` can be on.
-    pub(crate) fn lines_within(&self, width: R) -> usize {
-        let begins: Vec<R> = self.s.windows(2).filter(|k| k[0] < k[1]).map(|k| k[0]).collect();
-        let ends = begins.iter().skip(1).enumerate();
-        // From just below where a line ends.
-        let beyond = |(i, &end): (usize, &R)| begins.partition_point(|&b| b < end + width) - i;
-        ends.map(beyond).max().unwrap_or(1)
-    }
-
     /// The greatest extinction.
     pub(crate) fn steepest(&self) -> R {
         self.value.iter().fold(R::of(0.0), |most, v| most.max(v[0]))
@@ -136,15 +127,6 @@ impl<R: Real> Knots<R> {
             }
         }
         most
-    }
-
-    /// Whether extinction changes by a share that can be seen, and not as a step, between knots closer than `width`.
-    pub(crate) fn is_sharp(&self, width: R) -> bool {
-        let seen = self.steepest() * R::of(1e-2);
-        self.s.windows(2).zip(self.value.windows(2)).any(|(s, v)| {
-            let rise = v[1][0] - v[0][0];
-            s[0] < s[1] && s[1] - s[0] < width && rise.max(-rise) > seen
-        })
     }
 
     /// The greatest extinction on the intervals from the first to the last of `lines`.
@@ -347,7 +329,7 @@ pub(super) fn sample<const N: usize>(knots: &[(f64, [f64; N])], clamp: bool, s: 
 /// The knots of `value` over the normalised scalar, at `places` in the field's own units; both limits at each.
 pub(super) fn compile<R: Real>(
     mut places: Vec<f64>,
-    normal: Normal,
+    normal: Normalization,
     value: impl Fn(f64, Side) -> [f64; 4],
 ) -> Knots<R> {
     places.sort_by(f64::total_cmp);
@@ -467,21 +449,5 @@ mod tests {
             let (got, want) = (sample(&curve, true, s, Side::Above)[0], transfer.extinction(transfer.opacity_at(s)));
             assert!((got - want).abs() <= 1.01e-5 * want, "{s}: {got}, not {want}");
         }
-    }
-
-    #[test]
-    fn as_many_lines_are_counted_as_values_can_be_on() {
-        // At −0.2 a step, whose interval is empty.
-        let places = [-0.8, -0.7, -0.2, -0.2, 0.1, 0.6];
-        let knots = Knots::<f64>::new(places.iter().map(|&s| (s, [1.0 + s; 4])).collect());
-        for (width, expected) in [(0.0, 1), (0.05, 2), (0.3, 3), (0.55, 3), (0.7, 4), (1.2, 5), (3.0, 6)] {
-            let on = |low: f64| {
-                let lines = knots.s.windows(2).filter(|k| k[0] < k[1] && k[0] < low + width && k[1] > low);
-                lines.count().max(1)
-            };
-            let seen = (0..=20_000).map(|i| on(-2.0 + f64::from(i) * 2e-4)).max();
-            assert_eq!((knots.lines_within(width), seen), (expected, Some(expected)), "{width}");
-        }
-        assert_eq!(knots.steepest(), 1.6);
     }
 }

@@ -3,7 +3,7 @@
 mod components;
 mod texels;
 
-use super::choice::{Alpha, Choice, Form, Planes, Texels};
+use super::options::{Alpha, Form, IntegrationOptions, Planes, Texels};
 use super::second::OfTwo;
 use super::table::{
     Cylindrical, Kind, Polynomial, SecondOrder, SecondOrderPolynomial, Slabs, Table, length, mix, parabola,
@@ -30,7 +30,7 @@ const SOME: usize = 1024;
 
 /// A table of one of the forms.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Stored {
+pub(crate) enum TableData {
     Volume(Table),
     Polynomial(Polynomial),
     Cylindrical(Cylindrical),
@@ -40,9 +40,9 @@ pub(crate) enum Stored {
 
 /// The integral of segments by a table.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Lookup {
-    choice: Choice,
-    stored: Stored,
+pub struct PreintegratedTable {
+    options: IntegrationOptions,
+    stored: TableData,
     /// What texels stand for; for polynomials one for each power.
     ranges: Vec<Range>,
     direct: bool,
@@ -58,35 +58,34 @@ pub struct Integral<'a> {
     /// The exact integral.
     pub exact: &'a Exact<f32>,
     /// What takes its place where segments are integrated.
-    pub table: Option<&'a Lookup>,
+    pub table: Option<&'a PreintegratedTable>,
     /// What takes the place of both, of a function of two variables, or with light.
     pub(crate) second: Option<OfTwo<'a>>,
 }
 
-impl Lookup {
-    /// Builds the table that `choice` says, for segments of up to `longest` normalised units, on the current rayon
+impl PreintegratedTable {
+    /// Builds the table that `options` say, for segments of up to `longest` normalised units, on the current rayon
     /// pool.
     ///
     /// # Errors
     /// Those of [`check`].
-    pub fn new(exact: &Exact<f64>, choice: &Choice, longest: f64) -> Result<Self> {
+    pub fn new(exact: &Exact<f64>, options: &IntegrationOptions, longest: f64) -> Result<Self> {
         let exact = &*tabulated(exact);
-        let [front, back, depth] = sized(exact, choice, longest)?;
-        let stored = match choice.form {
-            Form::Volume => Table::closed(exact, choice.lengths, [front, back, depth], longest).map(Stored::Volume),
-            Form::Polynomial => Polynomial::closed(exact, choice.degree, front, longest).map(Stored::Polynomial),
-            Form::Cylindrical => Cylindrical::closed(exact, depth, front, longest).map(Stored::Cylindrical),
+        let [front, back, depth] = sized(exact, options, longest)?;
+        let stored = match options.form {
+            Form::Volume => Table::closed(exact, options.lengths, [front, back, depth], longest).map(TableData::Volume),
+            Form::Polynomial => Polynomial::closed(exact, options.degree, front, longest).map(TableData::Polynomial),
+            Form::Cylindrical => Cylindrical::closed(exact, depth, front, longest).map(TableData::Cylindrical),
             Form::SecondOrder => {
-                let in_bytes = choice.texels == Texels::Unorm8;
+                let in_bytes = options.texels == Texels::Unorm8;
                 let build = if in_bytes { SecondOrder::published_in_bytes } else { SecondOrder::published };
-                build(exact, front, longest, choice.iterations).map(Stored::SecondOrder)
+                build(exact, front, longest, options.iterations).map(TableData::SecondOrder)
             }
-            Form::SecondOrderPolynomial => {
-                SecondOrderPolynomial::closed(exact, choice.degree, front, longest).map(Stored::SecondOrderPolynomial)
-            }
+            Form::SecondOrderPolynomial => SecondOrderPolynomial::closed(exact, options.degree, front, longest)
+                .map(TableData::SecondOrderPolynomial),
             Form::Auto | Form::Exact => None,
         };
-        Self::of(exact, choice, stored)
+        Self::of(exact, options, stored)
     }
 
     /// The same, in the memory of `old` where that fits, which need not be had anew: where pages are small, that takes
@@ -94,104 +93,115 @@ impl Lookup {
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub(crate) fn renewed(old: Self, exact: &Exact<f64>, choice: &Choice, longest: f64) -> Result<Self> {
+    pub(crate) fn renewed(old: Self, exact: &Exact<f64>, options: &IntegrationOptions, longest: f64) -> Result<Self> {
         let exact = &*tabulated(exact);
-        let fits = old.choice == *choice && old.longest() == longest && old.source.is_none();
-        if !fits || old.size() != sized(exact, choice, longest)? {
-            return Self::new(exact, choice, longest);
+        let fits = old.options == *options && old.longest() == longest && old.source.is_none();
+        if !fits || old.size() != sized(exact, options, longest)? {
+            return Self::new(exact, options, longest);
         }
         let stored = match old.stored {
-            Stored::Volume(mut t) => {
+            TableData::Volume(mut t) => {
                 t.rebuild(exact);
-                Stored::Volume(t)
+                TableData::Volume(t)
             }
-            Stored::Polynomial(mut t) => {
+            TableData::Polynomial(mut t) => {
                 t.rebuild(exact);
-                Stored::Polynomial(t)
+                TableData::Polynomial(t)
             }
-            Stored::SecondOrder(mut t) => {
+            TableData::SecondOrder(mut t) => {
                 t.rebuild(exact);
-                Stored::SecondOrder(t)
+                TableData::SecondOrder(t)
             }
-            Stored::SecondOrderPolynomial(mut t) => {
+            TableData::SecondOrderPolynomial(mut t) => {
                 t.rebuild(exact);
-                Stored::SecondOrderPolynomial(t)
+                TableData::SecondOrderPolynomial(t)
             }
-            Stored::Cylindrical(_) => return Self::new(exact, choice, longest),
+            TableData::Cylindrical(_) => return Self::new(exact, options, longest),
         };
-        Self::of(exact, choice, Some(stored))
+        Self::of(exact, options, Some(stored))
     }
 
     /// The same table, without texels: those are for a device to build.
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub(crate) fn outline(exact: &Exact<f64>, choice: &Choice, longest: f64) -> Result<Self> {
+    pub(crate) fn outline(exact: &Exact<f64>, options: &IntegrationOptions, longest: f64) -> Result<Self> {
         let exact = &*tabulated(exact);
-        let [front, back, depth] = sized(exact, choice, longest)?;
-        let (direct, kind, degree) = (exact.direct, choice.lengths, choice.degree);
-        let stored = match choice.form {
-            Form::Volume => {
-                Some(Stored::Volume(Table { kind, size: [front, back, depth], longest, direct, texels: vec![].into() }))
-            }
+        let [front, back, depth] = sized(exact, options, longest)?;
+        let (direct, kind, degree) = (exact.direct, options.lengths, options.degree);
+        let stored = match options.form {
+            Form::Volume => Some(TableData::Volume(Table {
+                kind,
+                size: [front, back, depth],
+                longest,
+                direct,
+                texels: vec![].into(),
+            })),
             Form::Polynomial => {
                 let texels = vec![vec![]; degree as usize + 1];
-                Some(Stored::Polynomial(Polynomial { degree, size: front, longest, direct, texels }))
+                Some(TableData::Polynomial(Polynomial { degree, size: front, longest, direct, texels }))
             }
             Form::Cylindrical => {
-                Some(Stored::Cylindrical(Cylindrical { planes: depth, size: front, longest, texels: vec![] }))
+                Some(TableData::Cylindrical(Cylindrical { planes: depth, size: front, longest, texels: vec![] }))
             }
             Form::Auto | Form::Exact | Form::SecondOrder | Form::SecondOrderPolynomial => None,
         };
-        let choice = Choice { texels: Texels::Float, ..*choice };
-        Ok(Lookup { source: Some(Box::new(exact.clone())), ..Self::of(exact, &choice, stored)? })
+        let options = IntegrationOptions { texels: Texels::Float, ..*options };
+        Ok(PreintegratedTable { source: Some(Box::new(exact.clone())), ..Self::of(exact, &options, stored)? })
     }
 
-    fn of(exact: &Exact<f64>, choice: &Choice, stored: Option<Stored>) -> Result<Self> {
+    fn of(exact: &Exact<f64>, options: &IntegrationOptions, stored: Option<TableData>) -> Result<Self> {
         let stored = stored.ok_or_else(|| Error::Render("the exact integral has no table".into()))?;
         let unit = match &stored {
-            Stored::Volume(t) if t.kind != Kind::Uniform => length(t.kind, t.size[2], t.longest, 1),
-            Stored::Volume(Table { longest, .. })
-            | Stored::Polynomial(Polynomial { longest, .. })
-            | Stored::SecondOrder(SecondOrder { length: longest, .. })
-            | Stored::SecondOrderPolynomial(SecondOrderPolynomial { longest, .. })
-            | Stored::Cylindrical(Cylindrical { longest, .. }) => *longest,
+            TableData::Volume(t) if t.kind != Kind::Uniform => length(t.kind, t.size[2], t.longest, 1),
+            TableData::Volume(Table { longest, .. })
+            | TableData::Polynomial(Polynomial { longest, .. })
+            | TableData::SecondOrder(SecondOrder { length: longest, .. })
+            | TableData::SecondOrderPolynomial(SecondOrderPolynomial { longest, .. })
+            | TableData::Cylindrical(Cylindrical { longest, .. }) => *longest,
         };
         let inverse = (1.0 / unit) as f32;
-        let mut table = Lookup { choice: *choice, ranges: vec![], stored, direct: exact.direct, inverse, source: None };
+        let mut table = PreintegratedTable {
+            options: *options,
+            ranges: vec![],
+            stored,
+            direct: exact.direct,
+            inverse,
+            source: None,
+        };
         table.round();
         Ok(table)
     }
 
     /// Rounds texels to what they are stored as.
     fn round(&mut self) {
-        let levels = match self.choice.texels {
+        let levels = match self.options.texels {
             Texels::Float => 0.0,
             Texels::Unorm16 => 65535.0,
             Texels::Unorm8 => 255.0,
         };
         let density = if levels > 0.0 { self.density_span(f64::from(levels)) } else { None };
         let parts: Vec<(Range, &mut [[f32; 4]])> = match &mut self.stored {
-            Stored::Volume(t) => {
+            TableData::Volume(t) => {
                 let [r, g, b, most] = t.greatest();
                 vec![(from_zero([r, g, b, density.unwrap_or(most)]), &mut t.texels)]
             }
-            Stored::Cylindrical(t) => {
+            TableData::Cylindrical(t) => {
                 let [r, g, b, _] = greatest(&t.texels);
                 let colour = r.max(g).max(b);
                 vec![(from_zero([colour, colour, colour, 1.0]), &mut t.texels)]
             }
-            Stored::SecondOrder(SecondOrder { texels: Slabs::Float(texels), .. }) => {
+            TableData::SecondOrder(SecondOrder { texels: Slabs::Float(texels), .. }) => {
                 let of = if levels > 0.0 { greatest(texels) } else { [1.0; 4] };
                 vec![(from_zero([of[0], of[1], of[2], 1.0]), &mut texels[..])]
             }
             // Bytes are what they are.
-            Stored::SecondOrder(_) => vec![],
+            TableData::SecondOrder(_) => vec![],
             // Coefficients may be negative.
-            Stored::Polynomial(t) => {
+            TableData::Polynomial(t) => {
                 with_density(t.texels.iter_mut().map(|t| (within(t), &mut t[..])).collect(), density)
             }
-            Stored::SecondOrderPolynomial(t) => {
+            TableData::SecondOrderPolynomial(t) => {
                 with_density(t.texels.iter_mut().map(|t| (within(t), &mut t[..])).collect(), density)
             }
         };
@@ -224,16 +234,16 @@ impl Lookup {
         let (longest, greatest) = (
             self.longest(),
             match &self.stored {
-                Stored::Volume(t) if t.kind == Kind::LogNormalised => {
+                TableData::Volume(t) if t.kind == Kind::LogNormalised => {
                     let slices = t.texels.chunks_exact(t.size[0] as usize * t.size[1] as usize);
                     (0..).zip(slices).skip(1).for_each(|(k, s)| take(s, length(t.kind, t.size[2], t.longest, k)));
                     t.greatest()[3]
                 }
-                Stored::Polynomial(Polynomial { longest, .. })
-                | Stored::SecondOrderPolynomial(SecondOrderPolynomial { longest, .. }) => {
+                TableData::Polynomial(Polynomial { longest, .. })
+                | TableData::SecondOrderPolynomial(SecondOrderPolynomial { longest, .. }) => {
                     let first = match &self.stored {
-                        Stored::Polynomial(t) => &t.texels.first()?[..],
-                        Stored::SecondOrderPolynomial(t) => &t.texels.first()?[..],
+                        TableData::Polynomial(t) => &t.texels.first()?[..],
+                        TableData::SecondOrderPolynomial(t) => &t.texels.first()?[..],
                         _ => return None,
                     };
                     (0..8).for_each(|k| take(first, longest * f64::from(-k).exp2()));
@@ -256,8 +266,8 @@ impl Lookup {
     }
 
     /// What was chosen.
-    pub fn choice(&self) -> &Choice {
-        &self.choice
+    pub fn options(&self) -> &IntegrationOptions {
+        &self.options
     }
 
     /// The function of which a device builds the texels, if these are not here.
@@ -265,7 +275,7 @@ impl Lookup {
         self.source.as_deref()
     }
 
-    pub(crate) fn stored(&self) -> &Stored {
+    pub(crate) fn stored(&self) -> &TableData {
         &self.stored
     }
 
@@ -276,31 +286,31 @@ impl Lookup {
     /// Texels along each axis.
     pub fn size(&self) -> [u32; 3] {
         match &self.stored {
-            Stored::Volume(t) => t.size,
-            Stored::Polynomial(t) => [t.size, t.size, t.degree + 1],
-            Stored::Cylindrical(t) => [t.size, t.size, t.planes],
-            Stored::SecondOrder(SecondOrder { size, .. })
-            | Stored::SecondOrderPolynomial(SecondOrderPolynomial { size, .. }) => [*size; 3],
+            TableData::Volume(t) => t.size,
+            TableData::Polynomial(t) => [t.size, t.size, t.degree + 1],
+            TableData::Cylindrical(t) => [t.size, t.size, t.planes],
+            TableData::SecondOrder(SecondOrder { size, .. })
+            | TableData::SecondOrderPolynomial(SecondOrderPolynomial { size, .. }) => [*size; 3],
         }
     }
 
     /// Bytes of its texels, as they are held here or on a device of 32-bit floats.
     pub fn bytes(&self) -> u64 {
         match &self.stored {
-            Stored::SecondOrder(t) => t.bytes(),
-            Stored::SecondOrderPolynomial(t) => t.bytes(),
-            _ => Choice::bytes(self.size()),
+            TableData::SecondOrder(t) => t.bytes(),
+            TableData::SecondOrderPolynomial(t) => t.bytes(),
+            _ => IntegrationOptions::bytes(self.size()),
         }
     }
 
     /// The longest segment, in normalised units.
     pub fn longest(&self) -> f64 {
         match &self.stored {
-            Stored::Volume(t) => t.longest,
-            Stored::Polynomial(t) => t.longest,
-            Stored::Cylindrical(t) => t.longest,
-            Stored::SecondOrder(t) => t.length,
-            Stored::SecondOrderPolynomial(t) => t.longest,
+            TableData::Volume(t) => t.longest,
+            TableData::Polynomial(t) => t.longest,
+            TableData::Cylindrical(t) => t.longest,
+            TableData::SecondOrder(t) => t.length,
+            TableData::SecondOrderPolynomial(t) => t.longest,
         }
     }
 
@@ -309,7 +319,7 @@ impl Lookup {
     pub fn look_up(&self, front: f32, back: f32, length: f32) -> [f32; 4] {
         let (f, b) = (front * 0.5 + 0.5, back * 0.5 + 0.5);
         match &self.stored {
-            Stored::Volume(t) => {
+            TableData::Volume(t) => {
                 let [w, h, n] = t.size;
                 let steps = length * self.inverse;
                 let slices = match t.kind {
@@ -322,7 +332,7 @@ impl Lookup {
                 let texel = mix(bilinear(slices, w, i, j), bilinear(&slices[area..], w, i, j), share);
                 if t.kind == Kind::LogNormalised { self.reconstructed(texel, length) } else { texel }
             }
-            Stored::Polynomial(t) => {
+            TableData::Polynomial(t) => {
                 let (i, j) = (between(f, t.size), between(b, t.size));
                 let x = (length * self.inverse).min(1.0);
                 let mut sum = [0.0; 4];
@@ -332,7 +342,7 @@ impl Lookup {
                 }
                 self.reconstructed(sum, length)
             }
-            Stored::Cylindrical(t) => {
+            TableData::Cylindrical(t) => {
                 let l = (length * self.inverse).min(1.0);
                 let (d, s) = (f - b, (f - b).abs().max(l));
                 if s <= 0.0 {
@@ -349,14 +359,14 @@ impl Lookup {
                 let at = a * t.planes as f32;
                 let (i, j, area) = (between(s, t.size), between(b, t.size), (t.size * t.size) as usize);
                 let plane = |k: usize| bilinear(&t.texels[k % t.planes as usize * area..], t.size, i, j);
-                if self.choice.planes == Planes::One {
+                if self.options.planes == Planes::One {
                     return plane((at + 0.5) as usize);
                 }
                 let low = (at as usize).min(t.planes as usize - 1);
                 mix(plane(low), plane(low + 1), at - low as f32)
             }
             // A line is the parabola through its middle.
-            Stored::SecondOrder(_) | Stored::SecondOrderPolynomial(_) => {
+            TableData::SecondOrder(_) | TableData::SecondOrderPolynomial(_) => {
                 self.look_up_slab([front, (front + back) * 0.5, back], length)
             }
         }
@@ -367,8 +377,8 @@ impl Lookup {
     pub fn look_up_slab(&self, samples: [f32; 3], length: f32) -> [f32; 4] {
         let [front, _, back] = samples;
         match &self.stored {
-            Stored::SecondOrder(t) => trilinear(|i| t.texels.get(i), t.size, samples),
-            Stored::SecondOrderPolynomial(t) => {
+            TableData::SecondOrder(t) => trilinear(|i| t.texels.get(i), t.size, samples),
+            TableData::SecondOrderPolynomial(t) => {
                 let x = (length * self.inverse).min(1.0);
                 let mut sum = [0.0; 4];
                 for texels in t.texels.iter().rev() {
@@ -392,8 +402,8 @@ impl Lookup {
 
     /// Colour and opacity of a segment, from its colour over what is seen of it and its mean extinction.
     fn reconstructed(&self, [r, g, b, density]: [f32; 4], length: f32) -> [f32; 4] {
-        let alpha = match self.choice {
-            Choice { form: Form::Polynomial, alpha: Alpha::Linear, .. } => {
+        let alpha = match self.options {
+            IntegrationOptions { form: Form::Polynomial, alpha: Alpha::Linear, .. } => {
                 opacity_of_depth(density / self.inverse) * (length * self.inverse).min(1.0)
             }
             _ => opacity_of_depth(density * length),
@@ -440,21 +450,23 @@ fn tabulated(exact: &Exact<f64>) -> Cow<'_, Exact<f64>> {
     exact.weights().map_or(Cow::Borrowed(exact), Cow::Owned)
 }
 
-/// Texels along the axes of the table that `choice` says: where nobody said how many, by the bounds of its error.
-fn sized(exact: &Exact<f64>, choice: &Choice, longest: f64) -> Result<[u32; 3]> {
-    let mut size = choice.size(exact.opacity.len());
-    check(choice, size, exact.kind)?;
-    if choice.table.is_none() {
+/// Texels along the axes of the table that `options` say: where nobody said how many, by the bounds of its error.
+fn sized(exact: &Exact<f64>, options: &IntegrationOptions, longest: f64) -> Result<[u32; 3]> {
+    let mut size = options.size(exact.opacity.len());
+    check(options, size, exact.kind)?;
+    if options.table.is_none() {
         let [front, _, depth] = size;
         // Fewer values than the knots ask for, where that is known to be enough.
-        let fewer = match (choice.form, choice.lengths) {
-            (Form::Polynomial, _) => table::values_of_polynomial(exact, choice.degree, longest, SMALL_ERROR, front / 2),
+        let fewer = match (options.form, options.lengths) {
+            (Form::Polynomial, _) => {
+                table::values_of_polynomial(exact, options.degree, longest, SMALL_ERROR, front / 2)
+            }
             (Form::Volume, Kind::LogNormalised) => {
                 table::values_of_normalised(exact, depth, longest, SMALL_ERROR, front / 2)
             }
             _ => None,
         };
-        size = match (choice.form, choice.lengths, fewer) {
+        size = match (options.form, options.lengths, fewer) {
             (Form::Volume, Kind::Uniform, _) => table::size(exact, longest, UNIFORM_ERROR).unwrap_or(size),
             (_, _, Some(fewer)) => [fewer, fewer, depth],
             _ => size,
@@ -463,17 +475,17 @@ fn sized(exact: &Exact<f64>, choice: &Choice, longest: f64) -> Result<[u32; 3]> 
     Ok(size)
 }
 
-/// Whether `choice` can be drawn with, of that size and for fields of this kind.
+/// Whether `options` can be drawn with, of that size and for fields of this kind.
 ///
 /// # Errors
-/// Those of [`Choice::check`]; [`Error::Render`] for a table of parabolas of fields of several components.
-pub fn check(choice: &Choice, size: [u32; 3], kind: field::Kind) -> Result<()> {
-    if kind != field::Kind::Scalar && choice.form.is_of_second_order() {
+/// Those of [`IntegrationOptions::check`]; [`Error::Render`] for a table of parabolas of fields of several components.
+pub fn check(options: &IntegrationOptions, size: [u32; 3], kind: field::Kind) -> Result<()> {
+    if kind != field::Kind::Scalar && options.form.is_of_second_order() {
         return Err(Error::Render(
             "tables of parabolas are for fields of one component; use the exact integral".into(),
         ));
     }
-    choice.check(size)
+    options.check(size)
 }
 
 #[cfg(test)]

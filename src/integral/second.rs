@@ -27,8 +27,8 @@ mod special;
 mod wide;
 
 use super::Light as Gathered;
-use super::choice::{Method, Silhouettes, Two};
-use crate::field::Normal;
+use super::options::{Method, Silhouettes, Two};
+use crate::field::Normalization;
 use crate::transfer::bivariate::{Shape, Source, Table, Wave, Widget};
 use crate::transfer::shading::{Light, Shading};
 use crate::transfer::{Bivariate, Convention, Emission, TransferFunction};
@@ -71,7 +71,7 @@ pub(crate) struct Second {
     /// Direct emission of a colour of 1 per normalised unit of length.
     direct: Option<f64>,
     /// What values are mapped by: of s and of g.
-    normal: [Normal; 2],
+    normal: [Normalization; 2],
     two: Two,
     /// Of segments in equal pieces.
     ends: Ends,
@@ -264,7 +264,13 @@ fn next_end(clips: &[Clip], u: f64) -> Option<f64> {
 impl Second {
     /// Prepares `transfer` for values mapped by `normal`, those of s and of g, and gradients of a length up to 1, on a
     /// mesh whose coordinates were made (world − `centre`) · `scale`.
-    pub(crate) fn new(transfer: &TransferFunction, normal: [Normal; 2], centre: DVec3, scale: f64, two: Two) -> Self {
+    pub(crate) fn new(
+        transfer: &TransferFunction,
+        normal: [Normalization; 2],
+        centre: DVec3,
+        scale: f64,
+        two: Two,
+    ) -> Self {
         let source = match transfer.bivariate().map(Bivariate::source) {
             Some(Source::Widgets(widgets)) => {
                 let bounded = |w: &Widget| Bounded::new(w, transfer, LONGEST / scale);
@@ -322,9 +328,9 @@ impl Second {
         if let Some(p) = self.published {
             let normal = (segment.vector + segment.turn * 0.5).normalize_or_zero();
             let share = (1.0 - normal.dot(segment.along).abs()).max(0.0).powf(p);
-            own = Gathered { color: own.color.map(|c| c * share), through: 1.0 - (1.0 - own.through) * share };
+            own = Gathered { color: own.color.map(|c| c * share), transmittance: 1.0 - (1.0 - own.transmittance) * share };
         }
-        light.add(own.color.map(|c| c as f32), (1.0 - own.through) as f32);
+        light.add(own.color.map(|c| c as f32), (1.0 - own.transmittance) as f32);
     }
 
     #[inline(always)]

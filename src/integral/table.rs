@@ -1,6 +1,6 @@
 //! Pre-integrated tables: what a segment does, looked up by its values in front and behind and its length.
 //!
-//! Each form is judged by the exact integral, and read here as a device's linear filter reads it: [`Table`] has all
+//! Each form is compared with the exact integral, and read here as a device's linear filter reads it: [`Table`] has all
 //! three parameters, [`Polynomial`] the values only, and [`Cylindrical`] planes of two parameters that hold a projected
 //! cell each. [`SecondOrder`], [`SecondOrderLengths`] and [`SecondOrderPolynomial`] are for slabs along which the value is a parabola.
 //!
@@ -102,8 +102,8 @@ fn light(exact: &Exact<f64>, front: f64, back: f64, l: f64) -> Light<f64> {
 
 /// Premultiplied colour and opacity.
 fn published(exact: &Exact<f64>, front: f64, back: f64, l: f64) -> [f64; 4] {
-    let Light { color: [r, g, b], through } = light(exact, front, back, l);
-    [r, g, b, 1.0 - through]
+    let Light { color: [r, g, b], transmittance } = light(exact, front, back, l);
+    [r, g, b, 1.0 - transmittance]
 }
 
 #[cfg(test)]

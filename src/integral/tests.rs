@@ -63,7 +63,7 @@ fn limits_are_finite() {
 }
 
 fn exact<R: Real>(transfer: &TransferFunction, kind: Kind) -> Exact<R> {
-    Exact::new(transfer, kind, &[Normal { mid: 0.0, half: 1.0 }; 4], 1.0)
+    Exact::new(transfer, kind, &[Normalization { mid: 0.0, half: 1.0 }; 4], 1.0)
 }
 
 fn tent() -> TransferFunction {
@@ -80,9 +80,9 @@ fn marched(transfer: &TransferFunction, front: f64, back: f64, length: f64) -> L
         let (c, t) = (transfer.color_at(s), transfer.extinction(transfer.opacity_at(s)) * length / n as f64);
         let alpha = -(-t).exp_m1();
         for (sum, c) in light.color.iter_mut().zip(c) {
-            *sum += light.through * alpha * c;
+            *sum += light.transmittance * alpha * c;
         }
-        light.through *= 1.0 - alpha;
+        light.transmittance *= 1.0 - alpha;
     }
     light
 }
@@ -103,8 +103,8 @@ fn segments_are_split_at_knots() {
             assert!((got.color[k] - want.color[k]).abs() < 1e-6, "{f} {b} {l}: {got:?}, not {want:?}");
             assert!((f64::from(quick.color[k]) - want.color[k]).abs() < 2e-6, "{f} {b} {l}: {quick:?}, not {want:?}");
         }
-        assert!((got.through - want.through).abs() < 1e-6);
-        assert!((f64::from(quick.through) - want.through).abs() < 2e-6);
+        assert!((got.transmittance - want.transmittance).abs() < 1e-6);
+        assert!((f64::from(quick.transmittance) - want.transmittance).abs() < 2e-6);
     }
 }
 
@@ -147,16 +147,16 @@ fn a_stretch_of_opacity_1_ends_the_ray_and_a_point_does_not() {
     for exact in &stretches {
         for (f, b) in [(-0.9, 0.9), (0.9, -0.9), (0.25, 0.25), (0.21, 0.22)] {
             let light = through(exact, f, b);
-            assert!(light.through < 1e-6, "{f} to {b} lets {} through", light.through);
+            assert!(light.transmittance < 1e-6, "{f} to {b} lets {} through", light.transmittance);
         }
-        assert!(through(exact, -0.9, 0.1).through > 0.99);
+        assert!(through(exact, -0.9, 0.1).transmittance > 0.99);
     }
     let point = make(&[(-1.0, 0.0), (0.2, 1.0), (1.0, 0.0)]);
-    assert!(through(&point, -0.9, 0.9).through > 0.99);
-    assert!(through(&point, 0.2, 0.2).through < 1e-6, "a constant field at the point is a stretch");
+    assert!(through(&point, -0.9, 0.9).transmittance > 0.99);
+    assert!(through(&point, 0.2, 0.2).transmittance < 1e-6, "a constant field at the point is a stretch");
     let outside = make(&[(-0.5, 1.0), (0.0, 0.0), (0.5, 1.0)]);
     for (f, b) in [(-0.9, -0.8), (0.6, 0.7), (0.9, -0.9)] {
-        assert!(through(&outside, f, b).through < 1e-6);
+        assert!(through(&outside, f, b).transmittance < 1e-6);
     }
 }
 

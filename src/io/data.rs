@@ -97,7 +97,7 @@ pub(super) struct Appended {
 }
 
 /// Why an array cannot be read; [`Store`] adds its name.
-pub(super) enum Fault {
+pub(super) enum ArrayFault {
     Io(std::io::Error),
     Malformed(String),
     Unsupported(String),
@@ -105,21 +105,21 @@ pub(super) enum Fault {
     Lacking(Error),
 }
 
-impl From<Error> for Fault {
+impl From<Error> for ArrayFault {
     fn from(error: Error) -> Self {
-        Fault::Lacking(error)
+        ArrayFault::Lacking(error)
     }
 }
 
-impl From<std::io::Error> for Fault {
+impl From<std::io::Error> for ArrayFault {
     fn from(error: std::io::Error) -> Self {
-        Fault::Io(error)
+        ArrayFault::Io(error)
     }
 }
 
-impl From<String> for Fault {
+impl From<String> for ArrayFault {
     fn from(what: String) -> Self {
-        Fault::Malformed(what)
+        ArrayFault::Malformed(what)
     }
 }
 
@@ -127,21 +127,21 @@ impl Store {
     /// Opens an array, to be counted or read.
     pub(super) fn array<'a>(&'a self, array: &'a DataArray) -> Result<Contents<'a>> {
         let named = |fault| self.named(array, fault);
-        let file = self.input.open().map_err(|e| named(Fault::Io(e)))?;
+        let file = self.input.open().map_err(|e| named(ArrayFault::Io(e)))?;
         let body = self.body(array, file).map_err(named)?;
         Ok(Contents { store: self, array, body })
     }
 
-    fn named(&self, array: &DataArray, fault: Fault) -> Error {
+    fn named(&self, array: &DataArray, fault: ArrayFault) -> Error {
         match fault {
-            Fault::Io(source) => Error::file(&self.input.path, source),
-            Fault::Malformed(what) => Error::malformed(&self.input.path, format!("{array}: {what}")),
-            Fault::Unsupported(what) => Error::unsupported(&self.input.path, format!("{array}: {what}")),
-            Fault::Lacking(error) => error,
+            ArrayFault::Io(source) => Error::file(&self.input.path, source),
+            ArrayFault::Malformed(what) => Error::malformed(&self.input.path, format!("{array}: {what}")),
+            ArrayFault::Unsupported(what) => Error::unsupported(&self.input.path, format!("{array}: {what}")),
+            ArrayFault::Lacking(error) => error,
         }
     }
 
-    fn body(&self, array: &DataArray, file: Opened) -> Result<Body, Fault> {
+    fn body(&self, array: &DataArray, file: Opened) -> Result<Body, ArrayFault> {
         let bytes = match &array.data {
             Data::Ascii(ranges) => return Ok(Body::Text(text::read(&file, ranges)?)),
             Data::Base64(ranges) => {
@@ -166,7 +166,7 @@ impl Store {
             Some(name) => {
                 let codec = Codec::from_name(name).ok_or_else(|| {
                     let name = name.escape_debug();
-                    Fault::Unsupported(format!(
+                    ArrayFault::Unsupported(format!(
                         "it is compressed with {name}, which Halite does not know; write the file anew"
                     ))
                 })?;
@@ -176,14 +176,14 @@ impl Store {
     }
 
     /// The blocks of an array that is not compressed. Its header says how many bytes it has.
-    fn plain(&self, bytes: Bytes) -> Result<Blocks, Fault> {
+    fn plain(&self, bytes: Bytes) -> Result<Blocks, ArrayFault> {
         let total = self.words(&bytes, 1)?[0];
         Ok(Blocks { body: bytes.after(self.word)?, total, size: CHUNK, packed: None })
     }
 
     /// The blocks of a compressed array. Its header: number of blocks, bytes of each once unpacked, bytes of the last
     /// if it is not full (or 0), then the packed bytes of each.
-    fn packed(&self, bytes: Bytes, codec: Codec) -> Result<Blocks, Fault> {
+    fn packed(&self, bytes: Bytes, codec: Codec) -> Result<Blocks, ArrayFault> {
         let count = self.words(&bytes, 1)?[0];
         if count == 0 {
             return Ok(Blocks { body: bytes, total: 0, size: 1, packed: Some((codec, vec![0])) });
@@ -221,7 +221,7 @@ impl Store {
     }
 
     /// The first `count` numbers of an array's header.
-    fn words(&self, bytes: &Bytes, count: u64) -> Result<Vec<u64>, Fault> {
+    fn words(&self, bytes: &Bytes, count: u64) -> Result<Vec<u64>, ArrayFault> {
         let size = count.saturating_mul(self.word);
         if size > bytes.length() {
             return Err("the file ends inside its header".to_owned().into());
@@ -274,7 +274,7 @@ impl Bytes {
 
     /// What follows the first `header` bytes. In base64 these may be encoded together with what follows, or on their
     /// own, which their padding tells.
-    fn after(mut self, header: u64) -> Result<Self, Fault> {
+    fn after(mut self, header: u64) -> Result<Self, ArrayFault> {
         let characters = header.div_ceil(3) * 4;
         let mut padding = *b"=";
         if self.base64 && !header.is_multiple_of(3) {
@@ -293,7 +293,7 @@ impl Bytes {
     }
 
     /// Reads bytes from position `at` on.
-    fn read(&self, at: u64, out: &mut [u8]) -> Result<(), Fault> {
+    fn read(&self, at: u64, out: &mut [u8]) -> Result<(), ArrayFault> {
         let first = self.skip + at;
         if !self.base64 {
             return Ok(self.source.read(self.start + first, out)?);
@@ -373,7 +373,7 @@ impl Contents<'_> {
 
     /// Checks the array for `count` numbers. In point and cell data there may be more bytes, as some writers count
     /// wrongly (GetFEM) and VTK does not mind.
-    fn check(&self, count: u64) -> Result<(), Fault> {
+    fn check(&self, count: u64) -> Result<(), ArrayFault> {
         let Body::Blocks(blocks) = &self.body else {
             let found = self.count();
             return if found == count { Ok(()) } else { Err(format!("it holds {found} numbers, not {count}").into()) };
@@ -419,7 +419,7 @@ struct Scratch {
 
 impl Blocks {
     /// Decodes and converts numbers of `kind` until `out` is full, `size` bytes for each.
-    fn fill(&self, kind: Kind, swap: bool, out: &mut [u8], size: usize, put: &Put<'_>) -> Result<(), Fault> {
+    fn fill(&self, kind: Kind, swap: bool, out: &mut [u8], size: usize, put: &Put<'_>) -> Result<(), ArrayFault> {
         if self.packed.is_some() && !self.size.is_multiple_of(kind.size()) && self.total > self.size as u64 {
             // Blocks that cut numbers in two are put together first.
             let count = self.total as usize;

@@ -17,7 +17,7 @@ use crate::error::{Error, Result};
 use crate::memory;
 use crate::mesh::{Array, Attributes, Cells, Mesh, POLYHEDRON, Polyhedra, Values};
 use glam::DVec3;
-use scan::{Fault, Scanner, Type};
+use scan::{Scanner, Type};
 use std::path::Path;
 use structured::{Axes, Kind};
 
@@ -86,11 +86,11 @@ const SECTIONS: [&str; 2] = ["POINT_DATA", "CELL_DATA"];
 
 impl Parts {
     /// Reads all sections. The error is one of points or cells.
-    fn scan(&mut self, from: &mut Scanner<'_>) -> Result<(), Fault> {
+    fn scan(&mut self, from: &mut Scanner<'_>) -> Result<(), String> {
         while !from.is_at_end() {
             let at = from.at();
             let keyword = from.word("a keyword")?.to_ascii_uppercase();
-            let named = |what: Fault| format!("{keyword}, at byte {at}: {what}");
+            let named = |what: String| format!("{keyword}, at byte {at}: {what}");
             match keyword.as_str() {
                 "POINTS" | "CELLS" | "CELL_TYPES" => {
                     self.geometry(from, &keyword).map_err(named)?;
@@ -118,7 +118,7 @@ impl Parts {
         Ok(())
     }
 
-    fn geometry(&mut self, from: &mut Scanner<'_>, keyword: &str) -> Result<(), Fault> {
+    fn geometry(&mut self, from: &mut Scanner<'_>, keyword: &str) -> Result<(), String> {
         match keyword {
             "POINTS" => {
                 let count = from.count("the number of points")?;
@@ -144,7 +144,7 @@ impl Parts {
     }
 
     /// Cells: the number of points of each, and these; from version 5 on where each ends, and all points.
-    fn cells(&mut self, from: &mut Scanner<'_>) -> Result<(), Fault> {
+    fn cells(&mut self, from: &mut Scanner<'_>) -> Result<(), String> {
         let (count, size) = (from.count("the number of cells")?, from.count("the size of the list")?);
         self.connectivity.clear();
         if count == 0 {
@@ -170,7 +170,7 @@ impl Parts {
                 what + hint
             });
         }
-        let list = |from: &mut Scanner<'_>, count| -> Result<Values, Fault> {
+        let list = |from: &mut Scanner<'_>, count| -> Result<Values, String> {
             let kind = Type::from_name(&from.word("the type of the list")?, from.binary)?;
             from.values(kind, Some(count))?.ok_or_else(|| "it is a list of strings".to_owned())
         };
@@ -189,7 +189,7 @@ impl Parts {
     }
 
     /// Takes apart a list of cells: the number of points of each, and these.
-    fn unpack(&mut self, list: &[u32], count: usize) -> Result<(), Fault> {
+    fn unpack(&mut self, list: &[u32], count: usize) -> Result<(), String> {
         let mut rest = list;
         let mut offsets = Vec::with_capacity(count.min(list.len()) + 1);
         offsets.push(0);

@@ -98,7 +98,7 @@ impl Series {
             Place::There(path) => path,
             Place::Moved(path) => {
                 let (list, found) = (self.path.display(), path.display());
-                tracing::warn!("{list}: {} is not where it says; {found} is read", name.escape_debug());
+                tracing::warn!("{list}: {} is missing; {found} is read instead", name.escape_debug());
                 path
             }
             Place::Missing(path, answer) => return Err(Error::file(&path, answer)),

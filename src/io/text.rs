@@ -1,6 +1,6 @@
 //! The numbers of an array that is text.
 
-use super::data::{CHUNK, Fault, Put};
+use super::data::{ArrayFault, CHUNK, Put};
 use super::input::Opened;
 use super::number::{Kind, Number, with_kind};
 use crate::memory;
@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// The text of an array between its tags, parts separated by a space.
-pub(super) fn read(file: &Opened, ranges: &[Range<u64>]) -> Result<Vec<u8>, Fault> {
+pub(super) fn read(file: &Opened, ranges: &[Range<u64>]) -> Result<Vec<u8>, ArrayFault> {
     let mut text = Vec::new();
     let length: u64 = ranges.iter().map(|range| range.end - range.start + 1).sum();
     memory::reserve("the text of an array", &mut text, length as usize)?;

@@ -54,7 +54,7 @@ pub struct Tetrahedra {
     /// Number of cells that `corners` holds.
     pub cells: usize,
     /// The points that the split added.
-    pub added: Added,
+    pub added: SteinerPoints,
     /// The cells that were left out, by reason.
     pub skipped: Skipped,
     /// Polyhedra whose surface crosses itself: some of their tetrahedra overlap.
@@ -100,7 +100,7 @@ impl std::fmt::Display for Listed {
 
 /// Points that a split added, each the weighted mean of points of the mesh. Values at points are made likewise.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Added {
+pub struct SteinerPoints {
     /// The index of the first added point: the number of points of the mesh.
     pub first: u32,
     /// Added point `i` is made of the entries `ends[i − 1]..ends[i]` of the other two, the first from 0 on.
@@ -111,7 +111,7 @@ pub struct Added {
     pub weights: Vec<f64>,
 }
 
-impl Added {
+impl SteinerPoints {
     /// Number of points.
     pub fn len(&self) -> usize {
         self.ends.len()
@@ -125,7 +125,7 @@ impl Added {
     /// The points and weights that added point `i` is made of.
     ///
     /// # Panics
-    /// If `i` is not below [`Added::len`].
+    /// If `i` is not below [`SteinerPoints::len`].
     pub fn of(&self, i: usize) -> impl Iterator<Item = (u32, f64)> + '_ {
         let range = if i == 0 { 0 } else { self.ends[i - 1] as usize }..self.ends[i] as usize;
         self.sources[range.clone()].iter().copied().zip(self.weights[range].iter().copied())
@@ -263,7 +263,7 @@ impl Tetrahedra {
         let mut corners = memory::filled("the tetrahedra of its cells", [0; 4], total)?;
         let one_to_one = skipped.total() == 0 && mesh.cells().types.par_iter().all(|&t| t == 10);
         let mut cell = if one_to_one { Vec::new() } else { memory::filled("the cells of tetrahedra", 0, total)? };
-        let parts: Vec<(Added, Listed)> = split_by(&mut corners, &counted)
+        let parts: Vec<(SteinerPoints, Listed)> = split_by(&mut corners, &counted)
             .into_par_iter()
             .zip(if one_to_one {
                 counts.iter().map(|_| <&mut [u32]>::default()).collect()
@@ -277,7 +277,7 @@ impl Tetrahedra {
                 part
             })
             .collect();
-        let mut added = Added { first: first as u32, ..Added::default() };
+        let mut added = SteinerPoints { first: first as u32, ..SteinerPoints::default() };
         for (part, _) in &parts {
             let base = added.sources.len() as u64;
             added.ends.extend(part.ends.iter().map(|end| base + end));

@@ -44,14 +44,14 @@ pub struct Faces {
 
 /// One tetrahedron's view of a face.
 #[derive(Debug, Clone, Copy)]
-struct Half {
+struct HalfFace {
     /// Four times the tetrahedron plus the opposite corner.
     face: u32,
     /// 1 if the sorted face is counter-clockwise seen from outside a positive tetrahedron, else −1.
     parity: i8,
 }
 
-impl Half {
+impl HalfFace {
     fn tetrahedron(self) -> usize {
         self.face as usize / 4
     }
@@ -224,7 +224,7 @@ impl Matcher<'_> {
             .collect()
     }
 
-    /// The sorted welded points of face `f`, and its [`Half::parity`].
+    /// The sorted welded points of face `f`, and its [`HalfFace::parity`].
     fn face(&self, f: u32) -> ([u32; 3], i8) {
         let w = self.welded(f as usize / 4);
         let mut v = OUTWARD[f as usize % 4].map(|i| w[i]);
@@ -246,7 +246,7 @@ impl Matcher<'_> {
         degenerate: usize,
         neighbours: &[[AtomicU32; 4]],
         report: Report<'_>,
-    ) -> (Tally, Vec<Vec<Half>>) {
+    ) -> (Tally, Vec<Vec<HalfFace>>) {
         // Faces are dealt into buckets by ranges of their smallest point: the sorts then stay in the cache, and so do
         // the tetrahedra of a file that numbers neighbouring points alike.
         let records = 4 * self.corners.len();
@@ -262,7 +262,7 @@ impl Matcher<'_> {
         let report = |share: f64| report(0.35 + 0.55 * share);
         report(0.0);
         let progress = Progress::new(&report, buckets.len() as f64);
-        let results: Vec<(Tally, Vec<Vec<Half>>)> = (0..buckets.len())
+        let results: Vec<(Tally, Vec<Vec<HalfFace>>)> = (0..buckets.len())
             .into_par_iter()
             .map_init(Vec::new, |keys: &mut Vec<u128>, b| {
                 keys.clear();
@@ -273,7 +273,7 @@ impl Matcher<'_> {
                     (points << 33) | (u128::from(f) << 1) | u128::from(parity > 0)
                 }));
                 keys.sort_unstable();
-                let half = |key: u128| Half { face: (key >> 1) as u32, parity: if key & 1 == 1 { 1 } else { -1 } };
+                let half = |key: u128| HalfFace { face: (key >> 1) as u32, parity: if key & 1 == 1 { 1 } else { -1 } };
                 let (mut tally, mut later) = (Tally::default(), Vec::new());
                 for group in keys.chunk_by(|a, b| a >> 33 == b >> 33) {
                     if group.iter().any(|&key| half(key).side(orientation) == 0) {
@@ -281,7 +281,7 @@ impl Matcher<'_> {
                     } else if let &[a, b] = group {
                         tally = tally.plus(self.pair(&[half(a), half(b)], orientation, neighbours));
                     } else if group.len() > 2 {
-                        let group: Vec<Half> = group.iter().map(|&key| half(key)).collect();
+                        let group: Vec<HalfFace> = group.iter().map(|&key| half(key)).collect();
                         tally = tally.plus(self.pair(&group, orientation, neighbours));
                     }
                 }
@@ -302,9 +302,9 @@ impl Matcher<'_> {
 
     /// Makes one tetrahedron of each side of a face neighbours: on each side, the one whose opposite point has the
     /// smallest index (of cells with the same points, the first).
-    fn pair(&self, group: &[Half], orientation: &[i8], neighbours: &[[AtomicU32; 4]]) -> Tally {
+    fn pair(&self, group: &[HalfFace], orientation: &[i8], neighbours: &[[AtomicU32; 4]]) -> Tally {
         let first = |side: i8| {
-            let opposite = |h: &Half| (self.welded(h.tetrahedron())[h.face as usize % 4], h.face);
+            let opposite = |h: &HalfFace| (self.welded(h.tetrahedron())[h.face as usize % 4], h.face);
             group.iter().copied().filter(|h| h.side(orientation) == side).min_by_key(opposite)
         };
         let pair = match *group {
@@ -323,19 +323,19 @@ impl Matcher<'_> {
     /// Orients flat tetrahedra: round by round, those with oriented neighbours as most of these demand. Where nothing
     /// demands anything or demands are equal, the one with the smallest points goes as it is listed, like most others
     /// of the mesh do.
-    fn orient_flat(&self, groups: &[Vec<Half>], orientation: &mut [i8]) {
+    fn orient_flat(&self, groups: &[Vec<HalfFace>], orientation: &mut [i8]) {
         let majority = {
             let sum: i64 = orientation.par_iter().map(|&o| i64::from(o)).sum();
             if sum < 0 { -1 } else { 1 }
         };
-        let mut faces: Vec<(Half, u32)> = Vec::new();
+        let mut faces: Vec<(HalfFace, u32)> = Vec::new();
         for (g, group) in groups.iter().enumerate() {
             let flat = group.iter().filter(|h| h.side(orientation) == 0);
             faces.extend(flat.map(|&h| (h, g as u32)));
         }
         faces.sort_unstable_by_key(|(h, _)| h.face);
         // The faces of one flat tetrahedron now lie together, all four of them.
-        let tetrahedra: Vec<&[(Half, u32)]> = faces.chunk_by(|a, b| a.0.face / 4 == b.0.face / 4).collect();
+        let tetrahedra: Vec<&[(HalfFace, u32)]> = faces.chunk_by(|a, b| a.0.face / 4 == b.0.face / 4).collect();
         let of = |t: usize| tetrahedra.binary_search_by_key(&t, |f| f[0].0.tetrahedron());
         let demand = |i: usize, orientation: &[i8]| -> i64 {
             let per_face = tetrahedra[i].iter().map(|&(own, g)| {

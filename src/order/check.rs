@@ -2,7 +2,7 @@
 
 use super::PART;
 use super::screen::{self, Dealt, Lens, TILE};
-use crate::geometry::Geometry;
+use crate::geometry::TetMesh;
 use crate::view::View;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -44,7 +44,7 @@ impl Verdict {
 
 /// Compares `entries`, cells from back to front as [`super::VisibilityOrder`] has them, with what the rays of the view's pixels meet,
 /// on the current rayon pool.
-pub fn check(geometry: &Geometry, view: &View, entries: &[u32]) -> Verdict {
+pub fn check(geometry: &TetMesh, view: &View, entries: &[u32]) -> Verdict {
     let Some(lens) = Lens::new(geometry, view) else { return Verdict::default() };
     let mut rank = vec![NONE; geometry.cells.len()];
     for (&entry, r) in entries.iter().zip(0..) {

@@ -1,6 +1,6 @@
 //! Whether a mesh is convex: rays then enter it once.
 
-use crate::geometry::Geometry;
+use crate::geometry::TetMesh;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -8,7 +8,7 @@ use rayon::prelude::*;
 const SLACK: f64 = 1e-10;
 
 /// Whether all of the mesh is behind the plane of each of its boundary faces.
-pub(super) fn is_convex(geometry: &Geometry) -> bool {
+pub(super) fn is_convex(geometry: &TetMesh) -> bool {
     let boundary = &geometry.boundary;
     let behind = |face: &crate::geometry::boundary::BoundaryFace| {
         let [a, b, c] = face.points.map(|p| geometry.points[p as usize]);
@@ -20,7 +20,7 @@ pub(super) fn is_convex(geometry: &Geometry) -> bool {
 }
 
 /// Whether a boundary point p has n · p > `most`.
-fn reaches_beyond(geometry: &Geometry, normal: DVec3, most: f64) -> bool {
+fn reaches_beyond(geometry: &TetMesh, normal: DVec3, most: f64) -> bool {
     let boundary = &geometry.boundary;
     let beyond = |[low, high]: [DVec3; 2]| {
         let farthest = DVec3::select(normal.cmpgt(DVec3::ZERO), high, low);

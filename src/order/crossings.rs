@@ -6,7 +6,7 @@
 //! below 0.
 
 use super::screen::{ASIDE, Lens, PixelBox, TILE};
-use crate::geometry::Geometry;
+use crate::geometry::TetMesh;
 use crate::geometry::boundary::BoundaryFace;
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, f64x4};
@@ -51,7 +51,7 @@ impl Crossings {
     pub(crate) fn add<S: Simd>(
         &mut self,
         simd: S,
-        geometry: &Geometry,
+        geometry: &TetMesh,
         lens: &Lens,
         face: &BoundaryFace,
         b: PixelBox,
@@ -234,7 +234,7 @@ impl Crossings {
     pub(crate) fn find<'a>(
         &mut self,
         level: Level,
-        geometry: &Geometry,
+        geometry: &TetMesh,
         lens: &Lens,
         faces: impl Iterator<Item = (&'a BoundaryFace, PixelBox)>,
         corner: [u32; 2],

@@ -2,10 +2,10 @@
 //!
 //! The side of a face that the eye is on is the sign of n · (eye − a), n = (b − a) × (c − a), of its corners in ascending sequence of
 //! their indices: so both cells that share it compute the same number. On which side of it the cell is follows from the sequence of
-//! the cell's corners and [`Geometry`]'s exact orientation. Where the number is no more than rounding may have made of 0, the face is
+//! the cell's corners and [`TetMesh`]'s exact orientation. Where the number is no more than rounding may have made of 0, the face is
 //! edge-on, and no ray tells the two cells apart.
 
-use crate::geometry::Geometry;
+use crate::geometry::TetMesh;
 use crate::mesh::faces::BOUNDARY;
 use crate::view::View;
 use glam::DVec3;
@@ -23,7 +23,7 @@ pub(super) enum Source {
 }
 
 impl Source {
-    pub(super) fn new(geometry: &Geometry, view: &View) -> Self {
+    pub(super) fn new(geometry: &TetMesh, view: &View) -> Self {
         match view.eye() {
             Some(eye) => Source::Eye((eye - geometry.centre) * geometry.scale),
             None => Source::Along(view.fan(geometry.centre, geometry.scale, 0.0).direction[0].normalize_or_zero()),
@@ -97,7 +97,7 @@ pub(super) struct Facing {
 impl Facing {
     /// Of cell `i`, and the middle of it.
     #[inline(always)]
-    pub(super) fn new(geometry: &Geometry, source: Source, i: usize) -> (Self, DVec3) {
+    pub(super) fn new(geometry: &TetMesh, source: Source, i: usize) -> (Self, DVec3) {
         let cell = &geometry.cells[i];
         let mut q: [u64; 4] = std::array::from_fn(|k| u64::from(cell.corners[k]) << 2 | k as u64);
         for (a, b) in [(0, 1), (2, 3), (0, 2), (1, 3), (1, 2)] {

@@ -5,7 +5,7 @@
 
 use super::crossings::{Crossings, PIXELS, pixel_at};
 use super::screen::{self, Dealt, Lens, PixelBox, TILE};
-use crate::geometry::Geometry;
+use crate::geometry::TetMesh;
 use crate::geometry::boundary::BoundaryFace;
 use fearless_simd::Level;
 use rayon::prelude::*;
@@ -24,7 +24,7 @@ pub(super) struct Gap {
 
 /// Where the rays of a view cross the boundary of a mesh.
 pub(super) struct Rays<'a> {
-    geometry: &'a Geometry,
+    geometry: &'a TetMesh,
     lens: &'a Lens,
     level: Level,
     places: Vec<[f32; 2]>,
@@ -33,7 +33,7 @@ pub(super) struct Rays<'a> {
 }
 
 impl<'a> Rays<'a> {
-    pub(super) fn new(geometry: &'a Geometry, lens: &'a Lens) -> Self {
+    pub(super) fn new(geometry: &'a TetMesh, lens: &'a Lens) -> Self {
         let (mut places, mut boxes) = (vec![], vec![]);
         screen::project(lens, &geometry.points, &mut places);
         let (points, faces) = (&geometry.points, &geometry.boundary.faces);

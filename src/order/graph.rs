@@ -6,7 +6,7 @@
 
 use super::facing::{Facing, Source};
 use super::gaps::Gap;
-use crate::geometry::{Cell, Geometry};
+use crate::geometry::{Cell, TetMesh};
 use crate::mesh::faces::BOUNDARY;
 use rayon::prelude::*;
 
@@ -76,7 +76,7 @@ impl Queue {
 
 impl<'a> Graph<'a> {
     /// The graph of a mesh whose cells know their neighbours, with these gaps, ascending.
-    pub(super) fn new(geometry: &'a Geometry, source: Source, gaps: Vec<Gap>) -> Self {
+    pub(super) fn new(geometry: &'a TetMesh, source: Source, gaps: Vec<Gap>) -> Self {
         let [near, far] = source.depths(geometry.boundary.bounds());
         let step = (BUCKETS - 1) as f64 / (far - near).max(f64::MIN_POSITIVE);
         let node = |i: usize| {

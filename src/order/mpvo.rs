@@ -9,7 +9,7 @@ use super::gaps::Rays;
 use super::graph::{Edge, Graph};
 use super::screen::Lens;
 use super::{MOST_PARTS, PART, Provenance, VisibilityOrder, convex, cycles, published};
-use crate::geometry::Geometry;
+use crate::geometry::TetMesh;
 use crate::mesh::faces::OUTWARD;
 use crate::order::depth::HIDDEN;
 use crate::view::View;
@@ -67,7 +67,7 @@ impl Mpvo {
 
     /// The order of a mesh whose cells know their neighbours, on the current rayon pool. The result does not depend on its number of
     /// threads.
-    pub fn sequence(&mut self, geometry: &Geometry, view: &View, rule: Rule) -> Sequence {
+    pub fn sequence(&mut self, geometry: &TetMesh, view: &View, rule: Rule) -> Sequence {
         let source = Source::new(geometry, view);
         if rule == Rule::Depth {
             return Sequence { cells: published::by_depth(geometry, source), ..Sequence::default() };

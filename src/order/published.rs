@@ -6,11 +6,11 @@
 use super::facing::Source;
 use super::graph::Graph;
 use super::mpvo::Rule;
-use crate::geometry::Geometry;
+use crate::geometry::TetMesh;
 use glam::DVec3;
 
 /// All cells from front to back.
-pub(super) fn depth_first(graph: &Graph, geometry: &Geometry, source: Source, rule: Rule) -> Vec<u32> {
+pub(super) fn depth_first(graph: &Graph, geometry: &TetMesh, source: Source, rule: Rule) -> Vec<u32> {
     let n = graph.len();
     let mut starts: Vec<u32> = (0..n as u32).filter(|&c| !graph.waits(c)).collect();
     if rule == Rule::Nonconvex {
@@ -46,14 +46,14 @@ pub(super) fn depth_first(graph: &Graph, geometry: &Geometry, source: Source, ru
 }
 
 /// All cells from front to back by the distances of their centres.
-pub(super) fn by_depth(geometry: &Geometry, source: Source) -> Vec<u32> {
+pub(super) fn by_depth(geometry: &TetMesh, source: Source) -> Vec<u32> {
     let mut cells: Vec<u32> = (0..geometry.cells.len() as u32).collect();
     cells.sort_by_cached_key(|&c| ordered(depth(geometry, source, c)));
     cells
 }
 
 /// How far the centre of a cell is.
-fn depth(geometry: &Geometry, source: Source, cell: u32) -> f64 {
+fn depth(geometry: &TetMesh, source: Source, cell: u32) -> f64 {
     let corners = geometry.cells[cell as usize].corners;
     source.depth(corners.iter().map(|&p| geometry.points[p as usize]).sum::<DVec3>() / 4.0)
 }

@@ -8,7 +8,7 @@
 //! Depths along a pixel's ray are compared as keys, V = w₀ − w₀²/w in perspective (parallel: w − w₀), which are linear on the
 //! screen on every plane. w₀ is near the near side of the mesh, so keys are as small as the mesh is, wherever the camera is.
 
-use crate::geometry::Geometry;
+use crate::geometry::TetMesh;
 use crate::view::View;
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, Simd, f32x4, i32x4};
@@ -51,7 +51,7 @@ pub(crate) struct Lens {
 
 impl Lens {
     /// None if the mesh lies behind the eye.
-    pub(crate) fn new(geometry: &Geometry, view: &View) -> Option<Self> {
+    pub(crate) fn new(geometry: &TetMesh, view: &View) -> Option<Self> {
         let fan = view.fan(geometry.centre, geometry.scale, f64::INFINITY);
         let (origin, direction) = (fan.by_pixel(fan.origin, view.size()), fan.by_pixel(fan.direction, view.size()));
         let meet = view.eye().is_some();
@@ -162,7 +162,7 @@ impl Lens {
     }
 
     /// The keys between which pixel (`i`, `j`) is drawn.
-    pub(crate) fn limits(&self, geometry: &Geometry, view: &View, i: u32, j: u32) -> [f64; 2] {
+    pub(crate) fn limits(&self, geometry: &TetMesh, view: &View, i: u32, j: u32) -> [f64; 2] {
         let ray = view.ray(i, j);
         if ray.t_min >= ray.t_max {
             return [f64::INFINITY, f64::NEG_INFINITY];

@@ -21,7 +21,7 @@ mod setup;
 #[cfg(test)]
 pub(crate) mod tests;
 
-use crate::geometry::{Geometry, Values};
+use crate::geometry::{TetMesh, Values};
 use crate::integral::Integral;
 use crate::memory::prefetch;
 use crate::order::crossings::Crossings;
@@ -89,7 +89,7 @@ pub(crate) struct Counts {
 
 /// What a frame is drawn from.
 pub(crate) struct Frame<'a, const N: usize> {
-    pub(crate) geometry: &'a Geometry,
+    pub(crate) geometry: &'a TetMesh,
     pub(crate) values: &'a Values<N>,
     pub(crate) integral: Integral<'a>,
     pub(crate) view: &'a View,
@@ -151,7 +151,7 @@ impl Sweep {
     }
 
     /// Takes the values of cells, or the function, for changed.
-    pub(crate) fn forget_values(&mut self) {
+    pub(crate) fn invalidate_values(&mut self) {
         self.lines.clear();
     }
 

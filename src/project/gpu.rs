@@ -1,43 +1,45 @@
 //! The engine on a device: what it holds, and the passes of a frame.
 //!
-//! 1. `classify` (compute) finds the cells that are seen, and a key of depth for each; for devices in software the host
-//!    does.
-//! 2. These are put in order: that of the mesh, which the host finds, or by the keys.
-//! 3. Batch by batch, in that order, `project` (compute) makes a record of each cell, and the records are drawn.
+//! 1. `classify` (compute) finds the cells that are seen, and a key of depth for each.
+//! 2. These are put in order: by the keys, which the device sorts where it can; or that of the mesh, which the host finds.
+//! 3. Batch by batch, in that order, `project` (compute) makes a primitive of each cell, and the primitives are drawn.
 
+mod circumsphere;
 mod drawing;
 mod frame;
-mod keys;
 mod lines;
 mod ordering;
+mod primitive;
 mod program;
-mod record;
 
-use super::{Counts, Fragments, Order, Switches, Target};
+use super::{Fragments, Order, ProjectionCounts, ProjectionOptions, Target};
 use crate::error::{Error, Result};
-use crate::geometry::{Geometry, Values};
+use crate::field::Kind;
+use crate::geometry::{TetMesh, Values};
 use crate::gpu::buffers::{Buffer, Chunks};
 use crate::gpu::raster::{self, Slot, Texture};
-use crate::gpu::shader::{Array, Variant};
+use crate::gpu::scene::DeviceScene;
+use crate::gpu::shader::{ShaderArray, ShaderVariant};
 use crate::gpu::sort::Sorter;
 use crate::gpu::{DeviceChoice, Gpu, Part, arrays, function, table};
-use crate::integral::{Exact, Lookup};
+use crate::integral::{Exact, PreintegratedTable};
 use crate::order::mpvo::Mpvo;
-use crate::view::{Blend, View};
+use crate::view::Blend;
 use bytemuck::{Pod, Zeroable};
 use drawing::Canvas;
-use frame::Seen;
-use keys::Parts;
-use lines::{Extent, Lines};
+use frame::SeenView;
 use ordering::{Ordered, Sequenced, Sequencing};
-use program::{Drawn, Program, program};
-use record::Layout;
+use primitive::Layout;
+use program::{DrawSettings, Program, program};
 use std::sync::Arc;
 use std::time::Instant;
 use wgpu::{BufferUsages as Usage, ShaderStages as Stages};
 
-/// Records of one batch.
+/// Primitives of one batch.
 const BATCH: usize = 1 << 17;
+
+/// The arrays that the compute stages read, and what WGSL calls their elements.
+const ARRAYS: [(&str, &str); 3] = [("cells", "vec4u"), ("points", "Point"), ("values", "Value")];
 
 /// Invocations of a compute group, and groups along one axis at most.
 const GROUP: u32 = 64;
@@ -54,11 +56,10 @@ struct Slice {
 }
 
 /// The transfer function on the device.
-struct HeldFunction {
+struct FunctionBuffers {
     buffers: [Buffer; 3],
     lines: Texture,
     bins: Buffer,
-    ends: Vec<lines::End>,
 }
 
 /// A device, and what of the mesh, field and function it holds.
@@ -69,8 +70,7 @@ pub(crate) struct Project {
     cells: Option<Chunks>,
     points: Option<Chunks>,
     values: Option<Chunks>,
-    extent: Option<Extent>,
-    function: Option<HeldFunction>,
+    function: Option<FunctionBuffers>,
     /// What is known of the order of the mesh, and the last one.
     mpvo: Mpvo,
     sequence: Option<Sequenced>,
@@ -78,9 +78,9 @@ pub(crate) struct Project {
     programs: Vec<Program>,
     canvas: Option<Canvas>,
     ordered: Option<Ordered>,
-    table: table::Held,
+    table: table::TableCache,
     sorter: Option<Sorter>,
-    /// Whether the device sorts, and not the host.
+    /// Whether the device sorts where it can; tests have the host do it.
     sorts: bool,
     /// Entries of one buffer of an order that the host finds, a multiple of [`BATCH`].
     order_chunk: usize,
@@ -115,7 +115,6 @@ impl Project {
             }
         };
         use Slot::{Read, Uniform, Write};
-        let sorts = gpu.adapter.kind != "CPU";
         let shared = raster::layout(
             &gpu,
             Stages::COMPUTE | Stages::VERTEX_FRAGMENT,
@@ -129,16 +128,15 @@ impl Project {
             cells: None,
             points: None,
             values: None,
-            extent: None,
             function: None,
             mpvo: Mpvo::default(),
             sequence: None,
             programs: vec![],
             canvas: None,
             ordered: None,
-            table: table::Held::default(),
+            table: table::TableCache::default(),
             sorter: None,
-            sorts,
+            sorts: true,
             order_chunk: BATCH << 6,
         })
     }
@@ -147,11 +145,10 @@ impl Project {
         &self.gpu
     }
 
-    /// Sorts on the device or on the host from now on, whatever suits it.
+    /// Sorts on the device, where it can, or on the host from now on.
     #[cfg(test)]
     pub(crate) fn sort_on_device(&mut self, sorts: bool) {
         (self.sorts, self.ordered) = (sorts, None);
-        self.programs.clear();
     }
 
     /// Keeps so many entries of an order in one buffer from now on.
@@ -160,25 +157,15 @@ impl Project {
         (self.order_chunk, self.ordered) = (entries, None);
     }
 
-    /// Has each binding of an array hold so many bytes at most from now on.
+    /// The device, whose limits tests lower.
     #[cfg(test)]
-    pub(crate) fn bind_at_most(&mut self, bytes: u64) {
-        self.gpu.binding = bytes;
-        self.forget(Part::Mesh);
-    }
-
-    /// How many bindings cells, points and values have.
-    #[cfg(test)]
-    pub(crate) fn bindings(&self) -> Vec<usize> {
-        self.chunks().map_or(vec![], |all| all.iter().map(|c| c.buffers.len()).collect())
+    pub(crate) fn gpu_mut(&mut self) -> &mut Gpu {
+        &mut self.gpu
     }
 
     /// Takes `part` for changed.
-    pub(crate) fn forget(&mut self, part: Part) {
+    pub(crate) fn invalidate(&mut self, part: Part) {
         self.ordered = None;
-        if part != Part::Function {
-            self.extent = None;
-        }
         if matches!(part, Part::Mesh | Part::Points) {
             (self.mpvo, self.sequence) = (Mpvo::default(), None);
         }
@@ -191,7 +178,7 @@ impl Project {
     }
 
     /// Hands over what the device does not hold yet.
-    fn upload<const N: usize>(&mut self, geometry: &Geometry, values: &Values<N>) -> Result<()> {
+    fn upload<const N: usize>(&mut self, geometry: &TetMesh, values: &Values<N>) -> Result<()> {
         let gpu = &self.gpu;
         if self.cells.is_none() {
             self.cells = Some(Chunks::new(gpu, "cells", &geometry.cells, |c| c.corners)?);
@@ -208,20 +195,16 @@ impl Project {
     /// Has the device hold the function and `table`, or build that, unless it does.
     ///
     /// # Errors
-    /// Those of [`table::Held::prepare`].
-    pub(crate) fn prepare_table(&mut self, exact: &Exact<f32>, table: Option<&Arc<Lookup>>) -> Result<()> {
+    /// Those of [`table::TableCache::prepare`].
+    pub(crate) fn prepare_table(&mut self, exact: &Exact<f32>, table: Option<&Arc<PreintegratedTable>>) -> Result<()> {
         let gpu = &self.gpu;
         let function = match self.function.take() {
             Some(function) => function,
-            None => {
-                let ends = lines::bins(exact);
-                HeldFunction {
-                    buffers: function::upload(gpu, exact)?,
-                    lines: lines::image(gpu, exact)?,
-                    bins: Buffer::holding(gpu, "bins", &ends, Usage::STORAGE)?,
-                    ends,
-                }
-            }
+            None => FunctionBuffers {
+                buffers: function::upload(gpu, exact)?,
+                lines: lines::image(gpu, exact)?,
+                bins: Buffer::holding(gpu, "bins", &lines::bins(exact), Usage::STORAGE)?,
+            },
         };
         self.table.prepare(gpu, table, &self.function.insert(function).buffers)
     }
@@ -233,60 +216,49 @@ impl Project {
     /// [`Error::Device`] if the device cannot blend into the target, and those of [`Gpu::check`] and [`Buffer::new`].
     pub(crate) fn render<const N: usize>(
         &mut self,
-        geometry: &Geometry,
-        values: &Values<N>,
-        exact: &Exact<f32>,
-        table: Option<&Arc<Lookup>>,
-        view: &View,
-        switches: &Switches,
-    ) -> Result<(Vec<[f32; 4]>, Counts)> {
+        scene: &DeviceScene<'_, N>,
+        options: &ProjectionOptions,
+    ) -> Result<(Vec<[f32; 4]>, ProjectionCounts)> {
+        let DeviceScene { geometry, values, exact, table, view } = *scene;
         let is_maximum = view.blend() == Blend::Maximum;
         // Nothing is blended, and no segment integrated.
-        let format = if is_maximum { wgpu::TextureFormat::Rgba32Float } else { self.format(switches.target)? };
+        let format = if is_maximum { wgpu::TextureFormat::Rgba32Float } else { self.format(options.target)? };
         let table = table.filter(|_| !is_maximum);
         self.upload(geometry, values)?;
         self.prepare_table(exact, table)?;
-        let extent = *self.extent.get_or_insert_with(|| Extent::new(geometry, values));
         let association = arrays::association(values);
         let arrays = self.arrays()?;
-        let seen = Seen::new(geometry, view);
-        let is_rare = switches.fragments == Fragments::Intersected && (switches.dithers() || seen.limits().any());
-        let lines = match table {
-            Some(_) => Lines::None,
-            None if is_maximum => Lines::None,
-            // Devices that sort draw cells in one part; they do not mind look-ups.
-            None if self.sorts => Lines::looked_up(exact.kind),
-            None => Lines::new(exact, extent, switches.fragments == Fragments::Intersected),
-        };
-        let layout = Layout::new(switches.fragments, exact.kind.components(), lines, is_rare);
-        let variant = Variant { kind: exact.kind, direct: exact.direct };
+        let seen = SeenView::new(geometry, view);
+        let is_rare = options.fragments == Fragments::Intersected && (options.dithers() || seen.limits().any());
+        let has_line = table.is_none() && !is_maximum && exact.kind != Kind::Pair;
+        let layout = Layout::new(options.fragments, exact.kind.components(), has_line, is_rare);
+        let variant = ShaderVariant { kind: exact.kind, direct: exact.direct };
         let mut limits = seen.limits();
         // In parallel views all segments of a cell are on one plane.
-        let one_plane = table.is_some_and(|t| t.choice().per_cell) || view.eye().is_none();
-        // Processors do 4 × 4 pixels, graphics cards 2 × 2.
-        limits.block = if self.sorts { 2 } else { 4 };
-        limits.plane_per_cell = one_plane && switches.fragments != Fragments::Intersected;
-        let drawn = Drawn { switches, blend: view.blend() };
+        let one_plane = table.is_some_and(|t| t.options().per_cell) || view.eye().is_none();
+        limits.plane_per_cell = one_plane && options.fragments != Fragments::Intersected;
+        let drawn = DrawSettings { options, blend: view.blend() };
         let source = program(&variant, association, drawn, &layout, table.map(|t| &**t), limits, &arrays);
         self.prepare_canvas(&layout, view.size(), format, is_maximum)?;
         self.compile(&arrays, source, drawn, layout, format)?;
         let frame = Pass::new(self, &seen)?;
         // Without neighbours there is depth.
-        let by = match switches.order {
+        let by = match options.order {
             // The largest value needs none.
             _ if is_maximum => Order::None,
             order if geometry.is_connected() || order.rule().is_none() => order,
             _ => Order::Depth,
         };
-        let mut counts = Counts { order: by, ..Counts::default() };
-        let asked = Sequencing { by, parts: Parts::new(switches, lines), all: is_maximum };
+        let mut counts = ProjectionCounts { order: by, ..ProjectionCounts::default() };
+        let splits = options.fragments != Fragments::Intersected && view.eye().is_some();
+        let asked = Sequencing { by, splits, all: is_maximum };
         if !self.ordered.as_ref().is_some_and(|o| o.holds_for(&seen, asked)) {
             let start = Instant::now();
             self.ordered = None;
             if let Some(rule) = by.rule() {
                 self.find_sequence(geometry, view, &seen, rule);
             }
-            self.ordered = Some(self.order(&frame, &seen, geometry, values, asked)?);
+            self.ordered = Some(self.order(&frame, &seen, geometry, asked)?);
             counts.sorts = 1;
             counts.order_ms = start.elapsed().as_secs_f64() * 1e3;
         }
@@ -320,16 +292,11 @@ impl Project {
     }
 
     /// The arrays of group 1 of the compute stages, in the order of [`Self::chunks`].
-    fn arrays(&self) -> Result<[Array; 3]> {
-        let names = [("cells", "vec4u"), ("points", "Point"), ("values", "Value")];
-        let chunks = self.chunks()?;
-        Ok(std::array::from_fn(|i| {
-            let (name, element) = names[i];
-            Array { name, element, chunks: chunks[i].buffers.len(), shift: chunks[i].shift }
-        }))
+    fn arrays(&self) -> Result<[ShaderArray; 3]> {
+        Ok(arrays::named(ARRAYS, self.chunks()?))
     }
 
-    fn chunks(&self) -> Result<[&Chunks; 3]> {
+    pub(crate) fn chunks(&self) -> Result<[&Chunks; 3]> {
         match (&self.cells, &self.points, &self.values) {
             (Some(cells), Some(points), Some(values)) => Ok([cells, points, values]),
             _ => Err(Error::Render("the device does not hold the mesh".into())),
@@ -342,10 +309,10 @@ impl Project {
         slice: wgpu::BindingResource,
         keys: &Buffer,
         order: &Buffer,
-        records: wgpu::BindingResource,
+        primitives: wgpu::BindingResource,
     ) -> wgpu::BindGroup {
         let [keys, order] = [keys, order].map(|b| b.raw.as_entire_binding());
-        raster::group(&self.gpu, &self.own, [slice, frame.bins.as_entire_binding(), keys, order, records])
+        raster::group(&self.gpu, &self.own, [slice, frame.bins.as_entire_binding(), keys, order, primitives])
     }
 }
 
@@ -358,9 +325,9 @@ struct Pass {
 }
 
 impl Pass {
-    fn new(project: &Project, seen: &Seen) -> Result<Self> {
+    fn new(project: &Project, seen: &SeenView) -> Result<Self> {
         let gpu = &project.gpu;
-        let (Some(HeldFunction { buffers: function, lines, bins, .. }), Some(program), Some(table)) =
+        let (Some(FunctionBuffers { buffers: function, lines, bins, .. }), Some(program), Some(table)) =
             (&project.function, project.programs.first(), project.table.get())
         else {
             return Err(unprepared());
@@ -372,10 +339,10 @@ impl Pass {
         ];
         let shared = function.iter().chain(&buffers).map(|b| b.raw.as_entire_binding()).chain(table.bindings());
         let shared = shared.chain([wgpu::BindingResource::TextureView(&lines.view)]);
-        let arrays = project.chunks()?.into_iter().flat_map(|c| &c.buffers).map(|b| b.raw.as_entire_binding());
+        let arrays = project.chunks()?.into_iter().flat_map(|c| &c.buffers);
         Ok(Pass {
             shared: raster::group(gpu, &project.shared, shared),
-            arrays: raster::group(gpu, &program.arrays, arrays),
+            arrays: raster::group_of(gpu, &program.arrays, arrays),
             bins: bins.raw.clone(),
             _buffers: buffers,
         })

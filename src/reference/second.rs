@@ -1,4 +1,4 @@
-//! The judge of functions of two variables, and of light: formulas as scenes define them, integrated by halving.
+//! The reference for functions of two variables, and of light: formulas as scenes define them, integrated by halving.
 
 use super::{COMPONENTS, Interval, Light, Reference};
 use crate::field::{Association, Field, Kind};

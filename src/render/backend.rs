@@ -4,11 +4,12 @@
 use super::frame::Frame;
 use super::stats::{ProjectionStats, SweepStats};
 use crate::error::{Error, Result};
-use crate::geometry::{Geometry, Values};
+use crate::geometry::{TetMesh, Values};
+use crate::gpu::scene::DeviceScene;
 use crate::gpu::{DeviceChoice, Gpu, Part};
-use crate::integral::{Exact, Integral, Lookup};
+use crate::integral::{Exact, Integral, PreintegratedTable};
 use crate::project::cpu::{self as sweep, Sweep};
-use crate::project::{self, Switches, gpu::Project};
+use crate::project::{self, ProjectionOptions, gpu::Project};
 use crate::render::Engine;
 use crate::traverse::cpu;
 use crate::traverse::gpu::Traverse;
@@ -36,22 +37,22 @@ pub(super) struct Needs {
     pub(super) neighbours: bool,
     /// It reads neighbours if it is to draw in an order that needs them.
     pub(super) order: bool,
-    /// It draws meshes that are flat: see [`Geometry::is_flat`].
+    /// It draws meshes that are flat: see [`TetMesh::is_flat`].
     sheets: bool,
-    /// It draws meshes that are as thin in two directions: see [`Geometry::is_needle`].
+    /// It draws meshes that are as thin in two directions: see [`TetMesh::is_needle`].
     needles: bool,
 }
 
 impl Needs {
     /// Whether the backend can draw the mesh.
-    pub(super) fn are_met_by(self, geometry: &Geometry) -> bool {
+    pub(super) fn are_met_by(self, geometry: &TetMesh) -> bool {
         (self.sheets || !geometry.is_flat()) && (self.needles || !geometry.is_needle())
     }
 }
 
 /// A frame, and what it took.
 #[derive(Debug, Default)]
-pub(super) struct Drawn {
+pub(super) struct DrawnFrame {
     pub(super) pixels: Vec<[f32; 4]>,
     /// What walks did.
     pub(super) counts: cpu::Counts,
@@ -164,18 +165,23 @@ impl Backend {
     }
 
     /// Takes `part` for changed.
-    pub(super) fn forget(&mut self, part: Part) {
+    pub(super) fn invalidate(&mut self, part: Part) {
         match self {
             Backend::Walk => {}
-            Backend::Project(sweep) if part != Part::Points => sweep.forget_values(),
+            Backend::Project(sweep) if part != Part::Points => sweep.invalidate_values(),
             Backend::Project(_) => {}
-            Backend::WalkOnDevice(traverse) => traverse.forget(part),
-            Backend::ProjectOnDevice(project) => project.forget(part),
+            Backend::WalkOnDevice(traverse) => traverse.invalidate(part),
+            Backend::ProjectOnDevice(project) => project.invalidate(part),
         }
     }
 
     /// Has the device that draws hold `table`, or build it; `wait`s until that is done.
-    pub(super) fn hold(&mut self, exact: &Exact<f32>, table: &Arc<Lookup>, wait: bool) -> Result<()> {
+    pub(super) fn ensure_resident(
+        &mut self,
+        exact: &Exact<f32>,
+        table: &Arc<PreintegratedTable>,
+        wait: bool,
+    ) -> Result<()> {
         let gpu = match self {
             Backend::Walk | Backend::Project(_) => {
                 return Err(Error::Device("there is no device to build a table".into()));
@@ -193,7 +199,7 @@ impl Backend {
     }
 
     /// Draws a frame on the current rayon pool.
-    pub(super) fn draw<const N: usize>(&mut self, frame: &Frame, values: &Values<N>) -> Result<Drawn> {
+    pub(super) fn draw<const N: usize>(&mut self, frame: &Frame, values: &Values<N>) -> Result<DrawnFrame> {
         match self {
             Backend::Walk => Ok(walk(frame, values)),
             Backend::WalkOnDevice(traverse) => walk_on(traverse, frame, values),
@@ -209,17 +215,22 @@ fn integral<'a>(frame: &Frame<'a>) -> Integral<'a> {
     Integral { exact: frame.exact, table, second: None }
 }
 
-fn walk<const N: usize>(frame: &Frame, values: &Values<N>) -> Drawn {
+fn on_device<'a, const N: usize>(frame: &Frame<'a>, values: &'a Values<N>) -> DeviceScene<'a, N> {
+    let Frame { mesh, exact, table, view, .. } = *frame;
+    DeviceScene { geometry: &mesh.geometry, values, exact, table, view }
+}
+
+fn walk<const N: usize>(frame: &Frame, values: &Values<N>) -> DrawnFrame {
     let pixel = |v: &[f32; N]| frame.largest(v);
     let geometry = &frame.mesh.geometry;
     let (image, counts) = cpu::render(geometry, values, integral(frame), &pixel, frame.view, frame.progress);
-    Drawn { pixels: image.pixels, counts, ..Drawn::default() }
+    DrawnFrame { pixels: image.pixels, counts, ..DrawnFrame::default() }
 }
 
-fn walk_on<const N: usize>(traverse: &mut Traverse, frame: &Frame, values: &Values<N>) -> Result<Drawn> {
+fn walk_on<const N: usize>(traverse: &mut Traverse, frame: &Frame, values: &Values<N>) -> Result<DrawnFrame> {
     let geometry = &frame.mesh.geometry;
     let pixel = |v: &[f32; N]| frame.largest(v);
-    let mut drawn = traverse.render(geometry, values, frame.exact, frame.table, frame.view)?;
+    let mut drawn = traverse.render(&on_device(frame, values))?;
     let unfinished = Traverse::unfinished(&drawn.pixels);
     if frame.view.blend() == Blend::Maximum {
         drawn.pixels.par_iter_mut().for_each(|p| *p = Traverse::largest(p).map_or([0.0; 4], |v: [f32; N]| pixel(&v)));
@@ -228,11 +239,11 @@ fn walk_on<const N: usize>(traverse: &mut Traverse, frame: &Frame, values: &Valu
     unfinished.iter().zip(by_cpu).for_each(|(&i, p)| drawn.pixels[i] = p);
     drawn.counts.unfinished = unfinished.len() as u64;
     let _ = (frame.progress)(1.0);
-    Ok(Drawn { pixels: drawn.pixels, counts: drawn.counts, device_ms: drawn.device_ms, ..Drawn::default() })
+    Ok(DrawnFrame { pixels: drawn.pixels, counts: drawn.counts, device_ms: drawn.device_ms, ..DrawnFrame::default() })
 }
 
-fn project_by<const N: usize>(sweep: &mut Sweep, frame: &Frame, values: &Values<N>) -> Result<Drawn> {
-    if *frame.switches != Switches::default() {
+fn project_by<const N: usize>(sweep: &mut Sweep, frame: &Frame, values: &Values<N>) -> Result<DrawnFrame> {
+    if *frame.projection != ProjectionOptions::default() {
         return Err(Error::Device("the projection engine has variants on a graphics device only".into()));
     }
     let color = |v: &[f32; N]| frame.largest(v);
@@ -247,7 +258,7 @@ fn project_by<const N: usize>(sweep: &mut Sweep, frame: &Frame, values: &Values<
 }
 
 /// What the projection on the CPU drew.
-pub(super) fn swept((pixels, counts): (Vec<[f32; 4]>, sweep::Counts)) -> Drawn {
+pub(super) fn swept((pixels, counts): (Vec<[f32; 4]>, sweep::Counts)) -> DrawnFrame {
     let [overlaps, gaps, boundary, dense] = counts.redrawn;
     let sweep = SweepStats {
         dealt_cells: counts.cells,
@@ -261,24 +272,24 @@ pub(super) fn swept((pixels, counts): (Vec<[f32; 4]>, sweep::Counts)) -> Drawn {
     let mut walked = counts.walked;
     walked.steps += counts.fragments;
     walked.panels += counts.panels;
-    Drawn { pixels, counts: walked, sweep: Some(sweep), ..Drawn::default() }
+    DrawnFrame { pixels, counts: walked, sweep: Some(sweep), ..DrawnFrame::default() }
 }
 
-fn project_on<const N: usize>(project: &mut Project, frame: &Frame, values: &Values<N>) -> Result<Drawn> {
-    let Frame { mesh, exact, table, view, switches, .. } = frame;
-    let (mut pixels, counts) = project.render(&mesh.geometry, values, exact, *table, view, switches)?;
+fn project_on<const N: usize>(project: &mut Project, frame: &Frame, values: &Values<N>) -> Result<DrawnFrame> {
+    let Frame { mesh, view, projection, .. } = frame;
+    let (mut pixels, counts) = project.render(&on_device(frame, values), projection)?;
     let mut walked = vec![];
     if view.blend() == Blend::Maximum {
         let color = |p: &[f32; 4]| Traverse::largest(p).map_or([0.0; 4], |v: [f32; N]| frame.largest(&v));
         pixels.par_iter_mut().for_each(|p| *p = color(p));
-    } else if switches.walks() {
+    } else if projection.walks() {
         walked.extend(project.disordered().iter().map(|&p| p as usize));
         let color = |v: &[f32; N]| frame.largest(v);
         let by_cpu = cpu::render_pixels(&mesh.geometry, values, integral(frame), &color, view, &walked);
         walked.iter().zip(by_cpu).for_each(|(&i, p)| pixels[i] = p);
     }
     let _ = (frame.progress)(1.0);
-    let project::Counts { project_ms, draw_ms, .. } = counts;
+    let project::ProjectionCounts { project_ms, draw_ms, .. } = counts;
     let stats = ProjectionStats {
         drawn_cells: counts.cells,
         order: counts.order,
@@ -294,5 +305,5 @@ fn project_on<const N: usize>(project: &mut Project, frame: &Frame, values: &Val
         fragments: counts.fragments,
     };
     let device_ms = project_ms.zip(draw_ms).map(|(p, d)| p + d);
-    Ok(Drawn { pixels, device_ms, projection: Some(stats), ..Drawn::default() })
+    Ok(DrawnFrame { pixels, device_ms, projection: Some(stats), ..DrawnFrame::default() })
 }

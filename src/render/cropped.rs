@@ -32,11 +32,11 @@ impl Renderer {
 
     fn draw_parts(&mut self, parts: &[View], whole: &View, progress: &Progress) -> Result<Image> {
         let mut image = Image::new(whole.size());
-        let (mut steps, mut repaired, mut panels, count) = (0, 0, 0, parts.len() as f64);
+        let (mut steps, mut retraced, mut panels, count) = (0, 0, 0, parts.len() as f64);
         for (i, part) in parts.iter().enumerate() {
             let behind = self.render_or_recover(part, &|share| progress((i as f64 + share) / count))?;
             steps += self.stats.steps;
-            repaired += self.stats.repaired_rays;
+            retraced += self.stats.retraced_rays;
             panels += self.stats.panels;
             let maximum = self.as_values;
             image.pixels.par_iter_mut().zip(&behind.pixels).for_each(|(front, behind)| {
@@ -45,15 +45,15 @@ impl Renderer {
                         *front = *behind;
                     }
                 } else {
-                    let through = 1.0 - front[3];
-                    (0..4).for_each(|k| front[k] += through * behind[k]);
+                    let transmittance = 1.0 - front[3];
+                    (0..4).for_each(|k| front[k] += transmittance * behind[k]);
                 }
             });
             if progress((i + 1) as f64 / count).is_break() {
                 break;
             }
         }
-        (self.stats.steps, self.stats.repaired_rays, self.stats.panels) = (steps, repaired, panels);
+        (self.stats.steps, self.stats.retraced_rays, self.stats.panels) = (steps, retraced, panels);
         Ok(image)
     }
 }

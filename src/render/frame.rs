@@ -4,8 +4,8 @@ use super::Progress;
 use super::largest::Largest;
 use super::loaded::Loaded;
 use super::prepared::Prepared;
-use crate::integral::{Exact, Lookup};
-use crate::project::Switches;
+use crate::integral::{Exact, PreintegratedTable};
+use crate::project::ProjectionOptions;
 use crate::transfer::TransferFunction;
 use crate::view::View;
 use std::sync::Arc;
@@ -16,9 +16,9 @@ pub(super) struct Frame<'a> {
     pub(super) field: &'a Prepared,
     pub(super) transfer: &'a TransferFunction,
     pub(super) exact: &'a Exact<f32>,
-    pub(super) table: Option<&'a Arc<Lookup>>,
+    pub(super) table: Option<&'a Arc<PreintegratedTable>>,
     pub(super) view: &'a View,
-    pub(super) switches: &'a Switches,
+    pub(super) projection: &'a ProjectionOptions,
     /// Largest values become pixels as [`Largest`] says.
     pub(super) as_values: bool,
     pub(super) progress: &'a Progress<'a>,

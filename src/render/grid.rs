@@ -3,17 +3,17 @@
 mod second;
 
 use super::largest::Largest;
-use super::tables::Key;
+use super::tables::TableKey;
 use super::{Progress, Renderer, ms};
 use crate::cast::tabulated::{self, Tabulated};
 use crate::cast::{self, Order, Reconstruction, Samples, Sampling, Volume};
 use crate::error::{Error, Result};
-use crate::field::normal::Chooser;
-use crate::field::{Field, Kind, Normal};
+use crate::field::normalization::Chooser;
+use crate::field::{Field, Kind, Normalization};
 use crate::gpu::Part;
 use crate::grid::Grid;
 use crate::image::Image;
-use crate::integral::{Choice, Exact, Form, lookup};
+use crate::integral::{Exact, Form, IntegrationOptions, lookup};
 use crate::transfer::TransferFunction;
 use crate::view::{Blend, View};
 use second::Extra;
@@ -31,7 +31,7 @@ pub(super) struct LoadedGrid {
 #[derive(Debug)]
 struct OnGrid {
     field: Field,
-    normal: [Normal; 4],
+    normal: [Normalization; 4],
     samples: Samples,
     /// How values are mapped for tables.
     chooser: Chooser,
@@ -43,10 +43,10 @@ struct OnGrid {
 
 impl LoadedGrid {
     /// Takes the transfer function for changed.
-    pub(super) fn forget_function(&mut self) {
+    pub(super) fn invalidate_function(&mut self) {
         if let Some(field) = &mut self.field {
             field.exact = None;
-            field.extra.forget_function();
+            field.extra.invalidate_function();
         }
     }
 }
@@ -59,11 +59,11 @@ impl OnGrid {
     /// What is needed of a table; nothing for the integral itself.
     fn key(
         &mut self,
-        choice: &Choice,
+        choice: &IntegrationOptions,
         transfer: &TransferFunction,
         how: Reconstruction,
         volume: &Volume,
-    ) -> Result<Option<Key>> {
+    ) -> Result<Option<TableKey>> {
         if matches!(choice.form, Form::Auto | Form::Exact) {
             return Ok(None);
         }
@@ -81,7 +81,7 @@ impl OnGrid {
             Sampling::Steps(step) => 2.0 * step,
         };
         let longest = volume.scale * if how.order == Order::One { slab / 2.0 } else { slab };
-        Ok(Some(Key { exact: own, choice: *choice, longest, on_device: false }))
+        Ok(Some(TableKey { exact: own, choice: *choice, longest, on_device: false }))
     }
 
     fn largest<'a>(&'a self, transfer: &'a TransferFunction, as_values: bool) -> Largest<'a> {
@@ -99,7 +99,7 @@ impl Renderer {
         let start = Instant::now();
         let volume = self.pool.install(|| Volume::new(grid))?;
         (self.mesh, self.field) = (None, None);
-        self.forget(Part::Mesh);
+        self.invalidate(Part::Mesh);
         (self.stats.cells, self.stats.tetrahedra) = (volume.cell_count() as u64, 0);
         self.stats.faces_ms = ms(start);
         if let Some(gpu) = self.backend.gpu() {
@@ -220,9 +220,9 @@ impl Renderer {
         let stats = &mut self.stats;
         stats.panels = panels;
         stats.device_bytes = grid.volume.bytes() + field.samples.bytes() + field.extra.bytes();
-        (stats.steps, stats.repaired_rays, stats.cpu_rays) = (steps, 0, 0);
+        (stats.steps, stats.retraced_rays, stats.cpu_rays) = (steps, 0, 0);
         let own = if of_two { self.integral.two.method.name() } else { Form::Exact.name() };
-        stats.integral = built.as_ref().map_or(own, |b| b.table.choice().form.name()).into();
+        stats.integral = built.as_ref().map_or(own, |b| b.table.options().form.name()).into();
         stats.table_ms = built.as_ref().map_or(0.0, |b| b.ms);
         stats.table_bytes = built.as_ref().map_or(0, |b| b.table.bytes());
         (stats.device_ms, stats.projection, stats.sweep, stats.uploaded_bytes) = (None, None, None, 0);

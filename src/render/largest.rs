@@ -1,12 +1,12 @@
 //! What the largest value along a ray looks like.
 
-use crate::field::{Kind, Normal};
+use crate::field::{Kind, Normalization};
 use crate::transfer::TransferFunction;
 
 /// Turns largest values, as they are mapped, into pixels.
 pub(super) struct Largest<'a> {
     pub(super) kind: Kind,
-    pub(super) normal: &'a [Normal; 4],
+    pub(super) normal: &'a [Normalization; 4],
     pub(super) transfer: &'a TransferFunction,
     /// Pixels hold the values themselves, to be compared with others of the same ray: those of up to three components that
     /// have a say in the colour, then that which drives the opacity, which is not 0.

@@ -1,7 +1,7 @@
 //! The mesh that is drawn, laid out as a backend reads it.
 
 use super::backend::Needs;
-use crate::geometry::Geometry;
+use crate::geometry::TetMesh;
 use crate::mesh::cells::Tetrahedra;
 use crate::mesh::faces::Faces;
 use glam::DVec3;
@@ -10,7 +10,7 @@ use glam::DVec3;
 #[derive(Debug)]
 pub(super) struct Loaded {
     pub(super) tetrahedra: Tetrahedra,
-    pub(super) geometry: Geometry,
+    pub(super) geometry: TetMesh,
     pub(super) points: usize,
     pub(super) cells: usize,
     /// Whether cells know their neighbours.
@@ -32,16 +32,16 @@ impl Loaded {
     ) -> Self {
         let count = points.len();
         let points = tetrahedra.points(points);
-        let mut geometry = Geometry::default();
+        let mut geometry = TetMesh::default();
         if !needs.neighbours {
-            geometry = Geometry::unconnected(&points, &tetrahedra);
+            geometry = TetMesh::unconnected(&points, &tetrahedra);
         }
         // The walk needs neighbours.
         let connected = needs.neighbours || !needs.are_met_by(&geometry);
         if connected {
             // Laying the mesh out takes about as long as matching its faces.
             let faces = Faces::with_progress(&points, &tetrahedra.corners, &|share| report(share / 2.0));
-            geometry = Geometry::new(&points, &tetrahedra, &faces);
+            geometry = TetMesh::new(&points, &tetrahedra, &faces);
         }
         drop(points);
         let left_to_walk = !needs.are_met_by(&geometry);

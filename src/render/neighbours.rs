@@ -40,7 +40,7 @@ impl Stay {
 impl Renderer {
     /// Whether cells must know their neighbours for their order. Those of meshes that change with each frame need not.
     pub(super) fn orders_by_neighbours(&self) -> bool {
-        self.backend.needs().order && self.switches.order.rule().is_some() && !self.stay.is_short()
+        self.backend.needs().order && self.projection.order.rule().is_some() && !self.stay.is_short()
     }
 
     /// Finds the neighbours of cells if the next frame's order needs them, or says that it does without.
@@ -58,7 +58,7 @@ impl Renderer {
     }
 
     fn engine_needs_no_order(&self) -> bool {
-        !self.backend.needs().order || self.switches.order.rule().is_none()
+        !self.backend.needs().order || self.projection.order.rule().is_none()
     }
 
     /// Finds the neighbours of the cells of a mesh that was laid out without.
@@ -66,11 +66,11 @@ impl Renderer {
         let Some(mesh) = &mut self.mesh else { return Ok(()) };
         self.pool.install(|| mesh.geometry.connect());
         mesh.connected = true;
-        self.extra.forget_field();
+        self.extra.invalidate_field();
         if let Some(field) = &mut self.field {
             self.pool.install(|| field.bring_to(mesh))?;
         }
-        self.backend.forget(Part::Mesh);
+        self.backend.invalidate(Part::Mesh);
         Ok(())
     }
 }

@@ -2,7 +2,7 @@
 
 use super::loaded::Loaded;
 use crate::error::Result;
-use crate::field::normal::{Chooser, Normal};
+use crate::field::normalization::{Chooser, Normalization};
 use crate::field::{Field, Kind};
 use crate::geometry::Values;
 use crate::transfer::TransferFunction;
@@ -72,14 +72,14 @@ impl Prepared {
     }
 
     /// The map of each component.
-    pub(super) fn normal(&self) -> &[Normal; 4] {
+    pub(super) fn normal(&self) -> &[Normalization; 4] {
         self.chooser.normal()
     }
 }
 
 impl AnyValues {
-    fn new(mesh: &Loaded, field: &Field, normal: &[Normal; 4]) -> Result<Self> {
-        fn of<const N: usize>(mesh: &Loaded, field: &Field, normal: &[Normal; 4]) -> Result<Values<N>> {
+    fn new(mesh: &Loaded, field: &Field, normal: &[Normalization; 4]) -> Result<Self> {
+        fn of<const N: usize>(mesh: &Loaded, field: &Field, normal: &[Normalization; 4]) -> Result<Values<N>> {
             Values::new(&mesh.geometry, &mesh.tetrahedra, mesh.points, mesh.cells, field, normal)
         }
         Ok(match field.kind() {

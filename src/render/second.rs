@@ -2,14 +2,14 @@
 //! holds. The CPU draws them: the projection, or the walk.
 
 use super::backend::{Backend, swept};
-use super::{Drawn, Loaded, Progress, Renderer, Stats, missing, ms};
+use super::{DrawnFrame, Loaded, Progress, Renderer, Stats, missing, ms};
 use crate::error::{Error, Result};
 use crate::field::gradient::length;
-use crate::field::normal::MOST;
-use crate::field::{Association, Field, Gradient, Kind, Normal};
-use crate::geometry::{Geometry, Values};
+use crate::field::normalization::MOST;
+use crate::field::{Association, Field, Gradient, Kind, Normalization};
+use crate::geometry::{TetMesh, Values};
 use crate::image::Image;
-use crate::integral::choice::{Culling, Two};
+use crate::integral::options::{Culling, Two};
 use crate::integral::second::{LONGEST, OfTwo, Pairs, Second, Wide, places};
 use crate::integral::{Exact, Integral};
 use crate::project::cpu::{self as sweep, Sweep, UNSEEN};
@@ -67,7 +67,7 @@ pub(super) struct Seen {
 /// Values, and how they are mapped: s and g.
 #[derive(Debug)]
 struct Ready {
-    normal: [Normal; 2],
+    normal: [Normalization; 2],
     values: TwoOrFive,
 }
 
@@ -103,14 +103,14 @@ impl Renderer {
             let culled = made.seen.map_or((0, 0.0), |s| (s.culled, s.ms));
             Ok::<_, Error>((made.draw(mesh, longest, sweep, view, progress), culled))
         });
-        let (Drawn { pixels, counts, sweep, .. }, (culled_cells, culling_ms)) = drawn?;
+        let (DrawnFrame { pixels, counts, sweep, .. }, (culled_cells, culling_ms)) = drawn?;
         self.stats = Stats {
             integral: two.method.name().into(),
             table_ms: 0.0,
             table_bytes: 0,
             knots_per_cell: 0.0,
             steps: counts.steps,
-            repaired_rays: counts.repaired,
+            retraced_rays: counts.retraced,
             cpu_rays: 0,
             panels: counts.panels,
             culled_cells,
@@ -138,12 +138,12 @@ impl TwoOrFive {
 
 impl Extra {
     /// Points have moved, or the field is another.
-    pub(super) fn forget_field(&mut self) {
+    pub(super) fn invalidate_field(&mut self) {
         *self = Self::default();
     }
 
     /// The transfer function is another.
-    pub(super) fn forget_function(&mut self) {
+    pub(super) fn invalidate_function(&mut self) {
         (self.function, self.seen) = (None, None);
         self.lines.clear();
     }
@@ -186,27 +186,28 @@ impl Extra {
         let short = [field.is_short(), field.second().is_some_and(Field::is_short)];
         let normal = [0, 1].map(|k| {
             let [lo, hi] = [ranges[k][0].max(wanted[k][0]), ranges[k][1].min(wanted[k][1])];
-            let normal = if lo <= hi { Normal::new(lo, hi) } else { Normal::new(ranges[k][0], ranges[k][1]) };
+            let normal =
+                if lo <= hi { Normalization::new(lo, hi) } else { Normalization::new(ranges[k][0], ranges[k][1]) };
             // What f32 holds as it is, a power of two does not round.
             if short[k] {
-                Normal { mid: 0.0, half: (normal.mid.abs() + normal.half).log2().ceil().exp2() }
+                Normalization { mid: 0.0, half: (normal.mid.abs() + normal.half).log2().ceil().exp2() }
             } else {
                 normal
             }
         });
         let good = |ready: &Ready| {
-            let close = |old: Normal, new: Normal| {
+            let close = |old: Normalization, new: Normalization| {
                 old.half <= BETTER * new.half && (old.mid - new.mid).abs() + new.half <= old.half * (1.0 + 1e-9)
             };
             matches!(ready.values, TwoOrFive::Five(_)) == lit && (0..2).all(|k| close(ready.normal[k], normal[k]))
         };
         if !self.values.as_ref().is_some_and(good) {
-            self.forget_function();
+            self.invalidate_function();
             let values = self.gather(mesh, field, normal, lit);
             self.values = Some(Ready { normal, values });
         }
         let Some(ready) = &self.values else { return Err(Error::Render("there are no values to draw".into())) };
-        let Geometry { centre, scale, .. } = mesh.geometry;
+        let TetMesh { centre, scale, .. } = mesh.geometry;
         let function = match self.function.take() {
             Some(function) => function,
             None => Function::new(transfer, ready.normal, centre, scale, two)?,
@@ -232,7 +233,7 @@ impl Extra {
     }
 
     /// The values in the order of the mesh.
-    fn gather(&self, mesh: &Loaded, field: &Field, normal: [Normal; 2], lit: bool) -> TwoOrFive {
+    fn gather(&self, mesh: &Loaded, field: &Field, normal: [Normalization; 2], lit: bool) -> TwoOrFive {
         let (geometry, tetrahedra) = (&mesh.geometry, &mesh.tetrahedra);
         let scale = geometry.scale;
         let vector = |p: u32| self.gradient.as_ref().map(|g| g.vectors()[p as usize]).unwrap_or_default();
@@ -269,7 +270,7 @@ impl Extra {
 
 impl Seen {
     /// Judges all cells, on the current rayon pool.
-    fn new<const N: usize>(geometry: &Geometry, values: &Values<N>, second: &Second, culling: Culling) -> Self {
+    fn new<const N: usize>(geometry: &TetMesh, values: &Values<N>, second: &Second, culling: Culling) -> Self {
         let start = Instant::now();
         let cells = geometry.cells.len();
         let own = |v: &[f32; N]| second.own([v[0], v[1]].map(f64::from));
@@ -298,7 +299,13 @@ impl Seen {
 }
 
 impl Function {
-    fn new(transfer: &TransferFunction, normal: [Normal; 2], centre: DVec3, scale: f64, two: Two) -> Result<Self> {
+    fn new(
+        transfer: &TransferFunction,
+        normal: [Normalization; 2],
+        centre: DVec3,
+        scale: f64,
+        two: Two,
+    ) -> Result<Self> {
         let second = Second::new(transfer, normal, centre, scale, two);
         let even =
             TransferFunction::new(vec![(0.0, [1.0; 3])], vec![(0.0, 1.0)], 1.0)?.with_emission(transfer.emission())?;
@@ -332,7 +339,14 @@ pub(super) fn check(field: &Field, transfer: &TransferFunction, blend: Blend) ->
 
 impl Made<'_> {
     /// Draws a frame on the current rayon pool, by the projection if there is one, else by the walk.
-    fn draw(&self, mesh: &Loaded, longest: f64, sweep: Option<&mut Sweep>, view: &View, progress: &Progress) -> Drawn {
+    fn draw(
+        &self,
+        mesh: &Loaded,
+        longest: f64,
+        sweep: Option<&mut Sweep>,
+        view: &View,
+        progress: &Progress,
+    ) -> DrawnFrame {
         match self.values {
             TwoOrFive::Two(v) => self.draw_values(v, mesh, longest, sweep, view, progress),
             TwoOrFive::Five(v) => self.draw_values(v, mesh, longest, sweep, view, progress),
@@ -347,12 +361,12 @@ impl Made<'_> {
         sweep: Option<&mut Sweep>,
         view: &View,
         progress: &Progress,
-    ) -> Drawn {
+    ) -> DrawnFrame {
         let (geometry, seen) = (&mesh.geometry, self.seen.map(|s| &s.bits[..]));
         let Function { second, wide, even } = self.function;
         let Some(sweep) = sweep else {
             let (image, counts) = render_two(geometry, values, second, seen, view, progress);
-            return Drawn { pixels: image.pixels, counts, ..Drawn::default() };
+            return DrawnFrame { pixels: image.pixels, counts, ..DrawnFrame::default() };
         };
         let second = Some(OfTwo { second, wide, seen, lines: self.lines, longest });
         let integral = Integral { exact: even, table: None, second };

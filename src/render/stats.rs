@@ -33,7 +33,7 @@ pub struct Stats {
     /// Tetrahedra, or voxels of a grid, visited in the last frame, over all rays.
     pub steps: u64,
     /// Rays of the last frame that had to be traced again beside an edge.
-    pub repaired_rays: u64,
+    pub retraced_rays: u64,
     /// Rays of the last frame that the device left to the CPU, as they take more work than its driver allows.
     pub cpu_rays: u64,
     /// Panels that segments of two variables, or with light, were summed up in, over all rays of the last frame.

@@ -6,8 +6,8 @@
 
 use super::Renderer;
 use crate::error::{Error, Result};
-use crate::geometry::{Geometry, Values};
-use crate::integral::{Choice, Exact, Lookup};
+use crate::geometry::{TetMesh, Values};
+use crate::integral::{Exact, IntegrationOptions, PreintegratedTable};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::time::Instant;
@@ -17,9 +17,9 @@ const SAMPLES: usize = 1 << 16;
 
 /// All that a table depends on.
 #[derive(Debug, PartialEq)]
-pub(super) struct Key {
+pub(super) struct TableKey {
     pub(super) exact: Exact<f64>,
-    pub(super) choice: Choice,
+    pub(super) choice: IntegrationOptions,
     pub(super) longest: f64,
     /// The device that draws builds it.
     pub(super) on_device: bool,
@@ -28,29 +28,29 @@ pub(super) struct Key {
 /// A table, and the ms that building it took.
 #[derive(Debug, Clone)]
 pub(super) struct Built {
-    pub(super) table: Arc<Lookup>,
+    pub(super) table: Arc<PreintegratedTable>,
     pub(super) ms: f64,
 }
 
 /// The table of the frames now, and the one that is being built.
 #[derive(Debug, Default)]
 pub(super) struct Tables {
-    ready: Option<(Arc<Key>, Built)>,
-    building: Option<(Arc<Key>, Receiver<Result<Built>>)>,
+    ready: Option<(Arc<TableKey>, Built)>,
+    building: Option<(Arc<TableKey>, Receiver<Result<Built>>)>,
     /// The last one, whose memory the next takes.
-    spare: Option<Arc<Lookup>>,
+    spare: Option<Arc<PreintegratedTable>>,
     /// Not the renderer's: frames would wait behind the table's work.
     pool: Option<rayon::ThreadPool>,
 }
 
-impl Key {
-    fn build(&self, spare: Option<Arc<Lookup>>) -> Result<Built> {
+impl TableKey {
+    fn build(&self, spare: Option<Arc<PreintegratedTable>>) -> Result<Built> {
         let start = Instant::now();
-        let Key { exact, choice, longest, .. } = self;
+        let TableKey { exact, choice, longest, .. } = self;
         let table = match spare.and_then(Arc::into_inner) {
-            _ if self.on_device => Lookup::outline(exact, choice, *longest),
-            Some(old) => Lookup::renewed(old, exact, choice, *longest),
-            None => Lookup::new(exact, choice, *longest),
+            _ if self.on_device => PreintegratedTable::outline(exact, choice, *longest),
+            Some(old) => PreintegratedTable::renewed(old, exact, choice, *longest),
+            None => PreintegratedTable::new(exact, choice, *longest),
         }?;
         Ok(Built { table: Arc::new(table), ms: start.elapsed().as_secs_f64() * 1e3 })
     }
@@ -61,8 +61,8 @@ impl Tables {
     /// caller that waits.
     ///
     /// # Errors
-    /// Those of [`Lookup::new`].
-    pub(super) fn get(&mut self, key: &Arc<Key>, wait: bool, own: &rayon::ThreadPool) -> Result<Option<Built>> {
+    /// Those of [`PreintegratedTable::new`].
+    pub(super) fn get(&mut self, key: &Arc<TableKey>, wait: bool, own: &rayon::ThreadPool) -> Result<Option<Built>> {
         self.collect(key, wait)?;
         if let Some((ready, built)) = &self.ready
             && ready == key
@@ -86,7 +86,7 @@ impl Tables {
     ///
     /// # Errors
     /// [`Error::Render`] if no thread can be started.
-    pub(super) fn start(&mut self, key: &Arc<Key>, own: &rayon::ThreadPool) -> Result<()> {
+    pub(super) fn start(&mut self, key: &Arc<TableKey>, own: &rayon::ThreadPool) -> Result<()> {
         // One at a time: what is asked for last comes next.
         if self.building.is_some() || self.ready.as_ref().is_some_and(|r| r.0 == *key) {
             return Ok(());
@@ -106,19 +106,19 @@ impl Tables {
     }
 
     /// The table of `key`, if it is there.
-    pub(super) fn ready(&self, key: &Arc<Key>) -> Option<&Built> {
+    pub(super) fn ready(&self, key: &Arc<TableKey>) -> Option<&Built> {
         self.ready.as_ref().filter(|r| r.0 == *key).map(|r| &r.1)
     }
 
     /// Notes what building the table of `key` took.
-    pub(super) fn took(&mut self, key: &Arc<Key>, ms: f64) {
+    pub(super) fn took(&mut self, key: &Arc<TableKey>, ms: f64) {
         if let Some((_, built)) = self.ready.as_mut().filter(|r| r.0 == *key) {
             built.ms += ms;
         }
     }
 
     /// Takes what has been built, waiting for it if it is `key`'s.
-    fn collect(&mut self, key: &Arc<Key>, wait: bool) -> Result<()> {
+    fn collect(&mut self, key: &Arc<TableKey>, wait: bool) -> Result<()> {
         let Some((building, receiver)) = self.building.take() else { return Ok(()) };
         let same = building == *key;
         let got =
@@ -148,12 +148,12 @@ impl Tables {
 
 impl Renderer {
     /// Has the table built that a frame was drawn without.
-    pub(super) fn build_next(&mut self, late: Option<Arc<Key>>) -> Result<()> {
+    pub(super) fn build_next(&mut self, late: Option<Arc<TableKey>>) -> Result<()> {
         let Some(key) = late else { return Ok(()) };
         self.tables.start(&key, &self.pool)?;
         if let (true, Some(built), Some(exact)) = (key.on_device, self.tables.ready(&key), &self.exact) {
             // What fails now fails again in the next frame, which says so.
-            let _ = self.backend.hold(exact, &built.table, false);
+            let _ = self.backend.ensure_resident(exact, &built.table, false);
         }
         Ok(())
     }
@@ -161,7 +161,7 @@ impl Renderer {
 
 /// How many knots of the function the values of the mean cell have between them, those of opacity where that has a component of its
 /// own; of a sample, where there are many cells.
-pub(super) fn knots_in_cells<const N: usize>(geometry: &Geometry, values: &Values<N>, exact: &Exact<f32>) -> f64 {
+pub(super) fn knots_in_cells<const N: usize>(geometry: &TetMesh, values: &Values<N>, exact: &Exact<f32>) -> f64 {
     let knots = exact.opacity.places();
     let step = geometry.cells.len().div_ceil(SAMPLES).max(1);
     let (mut sum, mut count) = (0u64, 0u64);

@@ -1,6 +1,6 @@
 //! What a scene says of cropping regions, and of how grids are rebuilt along rays.
 
-use crate::cast::{Order, Reconstruction, Sampling};
+use crate::cast::{Reconstruction, Sampling};
 use crate::view::{Cropping, REGIONS};
 use glam::DMat4;
 use serde::Deserialize;
@@ -69,10 +69,7 @@ pub(super) fn reconstruction(
             None => Ok(None),
         };
     };
-    let Some((_, order)) = Order::ALL.into_iter().find(|o| o.0 == order) else {
-        let known = Order::ALL.map(|o| o.0).join(", ");
-        return Err(format!("reconstruction: \"{order}\" is not known here; there is {known}"));
-    };
+    let order = order.parse().map_err(|e| format!("reconstruction: {e}"))?;
     let sampling = match sampling {
         None => Sampling::Voxels,
         Some(SamplingJson::Name(name)) if name == "voxels" => Sampling::Voxels,

@@ -4,9 +4,9 @@
 
 mod segments;
 
-use crate::cell::{Face, Frame};
+use crate::cell::{Face, RayFrame};
 use crate::geometry::boundary::{Beam, Candidate};
-use crate::geometry::{Geometry, Values};
+use crate::geometry::{TetMesh, Values};
 use crate::image::Image;
 use crate::integral::second::Second;
 use crate::integral::{Integral, Light};
@@ -25,7 +25,7 @@ const TILE: u32 = 8;
 
 /// Transmittance below which a ray ends: what lies behind adds less than this times its colour to any channel. Direct
 /// emission has no such bound, and goes on as long as f32 can tell.
-pub const fn least_light(direct: bool) -> f32 {
+pub const fn least_transmittance(direct: bool) -> f32 {
     if direct { f32::MIN_POSITIVE } else { 1e-6 }
 }
 
@@ -33,8 +33,8 @@ pub const fn least_light(direct: bool) -> f32 {
 /// boundary faces only meet without sharing their corners, rounding could let it slip through.
 const TOO_CLOSE: f64 = 1e-12;
 
-/// How far aside, in normalised units.
-const ASIDE: f64 = 1e-9;
+/// How far rays that are traced again are moved, in normalised units.
+const PERTURBATION: f64 = 1e-9;
 
 /// What a frame took.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -42,7 +42,7 @@ pub struct Counts {
     /// Tetrahedra visited, over all rays.
     pub steps: u64,
     /// Rays that were traced again beside an edge.
-    pub repaired: u64,
+    pub retraced: u64,
     /// Rays that a device left to the CPU.
     pub unfinished: u64,
     /// Panels that segments of two variables, or with light, were summed up in.
@@ -53,7 +53,7 @@ pub struct Counts {
 /// for [`Blend::Maximum`]; `progress` is told the share that is done, and may say that no more is wanted: the rest
 /// stays empty.
 pub fn render<const N: usize>(
-    geometry: &Geometry,
+    geometry: &TetMesh,
     values: &Values<N>,
     integral: Integral,
     pixel: &(dyn Fn(&[f32; N]) -> [f32; 4] + Sync),
@@ -66,7 +66,7 @@ pub fn render<const N: usize>(
 /// Draws a frame whose segments are of two variables, or with light: `values` are s and g, or those and the gradient;
 /// `seen` has a bit for each cell that may be seen.
 pub(crate) fn render_two<const N: usize>(
-    geometry: &Geometry,
+    geometry: &TetMesh,
     values: &Values<N>,
     second: &Second,
     seen: Option<&[u64]>,
@@ -77,7 +77,7 @@ pub(crate) fn render_two<const N: usize>(
 }
 
 fn render_with<const N: usize, S: Segments<N>>(
-    geometry: &Geometry,
+    geometry: &TetMesh,
     values: &Values<N>,
     segments: &(impl Fn() -> S + Sync),
     pixel: &(dyn Fn(&[S::Value; N]) -> [f32; 4] + Sync),
@@ -107,7 +107,7 @@ fn render_with<const N: usize, S: Segments<N>>(
         })
         .reduce(Counts::default, |a, b| Counts {
             steps: a.steps + b.steps,
-            repaired: a.repaired + b.repaired,
+            retraced: a.retraced + b.retraced,
             unfinished: 0,
             panels: a.panels + b.panels,
         });
@@ -116,7 +116,7 @@ fn render_with<const N: usize, S: Segments<N>>(
 
 /// Draws only the pixels with these indices.
 pub(crate) fn render_pixels<const N: usize>(
-    geometry: &Geometry,
+    geometry: &TetMesh,
     values: &Values<N>,
     integral: Integral,
     pixel: &(dyn Fn(&[f32; N]) -> [f32; 4] + Sync),
@@ -128,7 +128,7 @@ pub(crate) fn render_pixels<const N: usize>(
 
 /// As [`render_pixels`], of segments of two variables, or with light.
 pub(crate) fn render_pixels_of_two<const N: usize>(
-    geometry: &Geometry,
+    geometry: &TetMesh,
     values: &Values<N>,
     second: &Second,
     seen: Option<&[u64]>,
@@ -139,7 +139,7 @@ pub(crate) fn render_pixels_of_two<const N: usize>(
 }
 
 fn pixels_with<const N: usize, S: Segments<N>>(
-    geometry: &Geometry,
+    geometry: &TetMesh,
     values: &Values<N>,
     segments: &(impl Fn() -> S + Sync),
     pixel: &(dyn Fn(&[S::Value; N]) -> [f32; 4] + Sync),
@@ -172,7 +172,7 @@ struct Gathered<V, const N: usize> {
 
 /// Traces rays, one after another.
 struct Tracer<'a, const N: usize, S> {
-    geometry: &'a Geometry,
+    geometry: &'a TetMesh,
     values: &'a Values<N>,
     segments: S,
     view: &'a View,
@@ -183,7 +183,7 @@ struct Tracer<'a, const N: usize, S> {
 }
 
 impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
-    fn new(geometry: &'a Geometry, values: &'a Values<N>, segments: S, view: &'a View) -> Self {
+    fn new(geometry: &'a TetMesh, values: &'a Values<N>, segments: S, view: &'a View) -> Self {
         let [low, high] = geometry.boundary.bounds();
         let both_ways = view.eye().is_some_and(|eye| {
             let eye = (eye - geometry.centre) * geometry.scale;
@@ -256,8 +256,8 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
         let gathered = self.trace(i, j);
         match (self.view.blend(), gathered.largest) {
             (Blend::Composite, _) => {
-                let Light { color: [r, g, b], through } = gathered.light;
-                [r, g, b, 1.0 - through]
+                let Light { color: [r, g, b], transmittance } = gathered.light;
+                [r, g, b, 1.0 - transmittance]
             }
             (Blend::Maximum, Some(values)) => pixel(&values),
             (Blend::Maximum, None) => [0.0; 4],
@@ -266,7 +266,7 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
 
     /// Collects the boundary faces that rays of the pixels `low..high` may enter through.
     fn find_candidates(&mut self, low: [u32; 2], high: [u32; 2]) {
-        let Geometry { centre, scale, points, boundary, .. } = self.geometry;
+        let TetMesh { centre, scale, points, boundary, .. } = self.geometry;
         let ([l, t], [r, b]) = (low.map(f64::from), high.map(f64::from));
         // Rays pass through pixel centres, but an offset may move them.
         let margin = 0.5 + self.view.pixel_offset().abs().max_element();
@@ -292,12 +292,12 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
     #[inline(always)]
     fn trace(&mut self, i: u32, j: u32) -> Gathered<S::Value, N> {
         let ray = self.view.ray(i, j);
-        let Geometry { centre, scale, .. } = *self.geometry;
+        let TetMesh { centre, scale, .. } = *self.geometry;
         let origin = (ray.origin - centre) * scale;
         // From the point of the ray that is nearest to the middle of the mesh, so that no distance is great.
         let start = -origin.dot(ray.direction);
         let (t_min, t_max) = (ray.t_min * scale - start, ray.t_max * scale - start);
-        let straight = Frame::new(origin + ray.direction * start, ray.direction);
+        let straight = RayFrame::new(origin + ray.direction * start, ray.direction);
         let none = || Gathered { light: Light::none(), largest: None };
         if t_min.max(-4.0) >= t_max.min(4.0) {
             return none();
@@ -309,33 +309,33 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
             if self.walk(&frame, pixel, [t_min, t_max], attempt == 3, &mut gathered) {
                 return gathered;
             }
-            self.counts.repaired += u64::from(attempt == 1);
-            frame = straight.shifted(ASIDE * f64::from(attempt), ASIDE * 0.618 * f64::from(attempt));
+            self.counts.retraced += u64::from(attempt == 1);
+            frame = straight.shifted(PERTURBATION * f64::from(attempt), PERTURBATION * 0.618 * f64::from(attempt));
         }
         none()
     }
 
-    /// Follows one ray; false if it passed too close to an edge of the boundary, unless `anyhow`.
+    /// Follows one ray; false if it passed too close to an edge of the boundary, unless `accept_grazing`.
     #[inline(always)]
     fn walk(
         &mut self,
-        frame: &Frame,
+        frame: &RayFrame,
         pixel: DVec2,
         [t_min, t_max]: [f64; 2],
-        anyhow: bool,
+        accept_grazing: bool,
         gathered: &mut Gathered<S::Value, N>,
     ) -> bool {
         let (origin, along) = frame.ray();
         self.segments.begin(origin, along);
-        if !self.find_entries(frame, pixel) && !anyhow {
+        if !self.find_entries(frame, pixel) && !accept_grazing {
             return false;
         }
         for e in 0..self.entries.len() {
-            if self.entries[e].t >= t_max || self.is_over(gathered) {
+            if self.entries[e].t >= t_max || self.is_terminated(gathered) {
                 break;
             }
             let exit = self.follow(frame, e, [t_min, t_max], gathered);
-            if exit.is_some_and(is_close) && !anyhow {
+            if exit.is_some_and(is_close) && !accept_grazing {
                 return false;
             }
         }
@@ -345,8 +345,8 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
 
     /// Collects where the ray enters the mesh, in order; false if any of it is too close to an edge.
     #[inline(always)]
-    fn find_entries(&mut self, frame: &Frame, pixel: DVec2) -> bool {
-        let Geometry { points, boundary, .. } = self.geometry;
+    fn find_entries(&mut self, frame: &RayFrame, pixel: DVec2) -> bool {
+        let TetMesh { points, boundary, .. } = self.geometry;
         let mut clear = true;
         self.entries.clear();
         for c in &self.candidates {
@@ -369,12 +369,12 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
     #[inline(always)]
     fn follow(
         &mut self,
-        frame: &Frame,
+        frame: &RayFrame,
         e: usize,
         [t_min, t_max]: [f64; 2],
         gathered: &mut Gathered<S::Value, N>,
     ) -> Option<[f64; 3]> {
-        let Geometry { points, cells, .. } = self.geometry;
+        let TetMesh { points, cells, .. } = self.geometry;
         let Entry { t, points: mut ids, mut cell, mut face } = self.entries[e];
         let (mut t, mut reached, mut weights) = (t, t_min, face.weights());
         let mut front = self.value(cell, &ids, &weights);
@@ -411,7 +411,7 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
                     self.gather(at(from), at(to), [from, to], gathered);
                 }
                 reached = left;
-                if reached >= t_max || self.is_over(gathered) {
+                if reached >= t_max || self.is_terminated(gathered) {
                     return None;
                 }
             }
@@ -426,8 +426,8 @@ impl<'a, const N: usize, S: Segments<N>> Tracer<'a, N, S> {
 
     /// Whether nothing behind can be seen.
     #[inline(always)]
-    fn is_over(&self, gathered: &Gathered<S::Value, N>) -> bool {
-        gathered.light.through < self.segments.least_light()
+    fn is_terminated(&self, gathered: &Gathered<S::Value, N>) -> bool {
+        gathered.light.transmittance < self.segments.least_transmittance()
     }
 
     #[inline(always)]

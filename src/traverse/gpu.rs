@@ -1,24 +1,26 @@
 //! The walk on a GPU: what `shaders/traverse.wgsl` needs, handed over once and kept until it changes.
 
-use super::cpu::{Counts, least_light};
+use super::cpu::{Counts, least_transmittance};
 use crate::error::{Error, Result};
 use crate::geometry::boundary::{BoundaryFace, LEAF};
-use crate::geometry::{Cell, Geometry, Values};
+use crate::geometry::{Cell, TetMesh, Values};
 use crate::gpu::buffers::{Buffer, Chunks};
+use crate::gpu::clock::Clock;
 use crate::gpu::function;
+use crate::gpu::raster::{Readback, Slot};
 use crate::gpu::rays::{self, FAR};
-use crate::gpu::shader::{self, Array, Binding, Variant};
+use crate::gpu::scene::DeviceScene;
+use crate::gpu::shader::{self, ShaderArray, ShaderVariant};
 use crate::gpu::table::{self, TABLE};
 use crate::gpu::{Gpu, Part, arrays, raster};
-use crate::integral::{Exact, Lookup};
+use crate::integral::{Exact, PreintegratedTable};
 use crate::mesh::faces::BOUNDARY;
 use crate::view::{Blend, View};
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
-use wgpu::BufferUsages as Usage;
+use wgpu::{BufferUsages as Usage, ShaderStages as Stages};
 
 const TRAVERSE: &str = include_str!("../../shaders/traverse.wgsl");
 
@@ -63,13 +65,13 @@ const AHEAD: usize = 8;
 /// place: above most rounding of places across a ray.
 const CLOSE: f32 = 2e-7;
 
-/// How far aside, in normalised units.
-const ASIDE: f32 = 2e-7;
+/// How far rays that are traced again are moved, in normalised units.
+const PERTURBATION: f32 = 2e-7;
 
-/// `Frame` in the shader.
+/// `RayUniforms` in the shader.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
-struct Frame {
+struct RayUniforms {
     origin: [[[f32; 4]; 2]; 3],
     direction: [[[f32; 4]; 2]; 3],
     size: [u32; 2],
@@ -107,12 +109,12 @@ struct Bounds {
 struct RawCounts {
     steps: u32,
     carry: u32,
-    repaired: u32,
+    retraced: u32,
     unused: u32,
 }
 
 /// A frame as the device drew it.
-pub(crate) struct Drawn {
+pub(crate) struct WalkedFrame {
     /// Premultiplied colours; for [`Blend::Maximum`] the largest values instead.
     pub(crate) pixels: Vec<[f32; 4]>,
     pub(crate) counts: Counts,
@@ -132,15 +134,15 @@ pub(crate) struct Traverse {
     program: Option<(String, wgpu::ComputePipeline, wgpu::BindGroupLayout)>,
     /// Tables have a group of their own, in programs that read them.
     tables: wgpu::BindGroupLayout,
-    table: table::Held,
+    table: table::TableCache,
 }
 
 impl Traverse {
     pub(crate) fn new(gpu: Gpu) -> Self {
-        use Binding::{Read, Uniform, Write};
-        let layout = shader::group_layout(&gpu, &[Uniform, Read, Read, Uniform, Read, Read, Write, Write]);
-        let tables = raster::layout(&gpu, wgpu::ShaderStages::COMPUTE, &table::SLOTS);
-        let table = table::Held::default();
+        use Slot::{Read, Uniform, Write};
+        let own = [Uniform, Read, Read, Uniform, Read, Read, Write, Write];
+        let [layout, tables] = [&own[..], &table::SLOTS[..]].map(|slots| raster::layout(&gpu, Stages::COMPUTE, slots));
+        let table = table::TableCache::default();
         Traverse { gpu, layout, cells: None, points: None, values: None, function: None, program: None, tables, table }
     }
 
@@ -148,21 +150,14 @@ impl Traverse {
         &self.gpu
     }
 
-    /// Has each binding of an array hold so many bytes at most from now on.
+    /// The device, whose limits tests lower.
     #[cfg(test)]
-    pub(crate) fn bind_at_most(&mut self, bytes: u64) {
-        self.gpu.binding = bytes;
-        self.forget(Part::Mesh);
-    }
-
-    /// How many bindings the arrays of the mesh have, in the order of [`Self::chunks`].
-    #[cfg(test)]
-    pub(crate) fn bindings(&self) -> Vec<usize> {
-        self.chunks().map_or(vec![], |all| all.iter().map(|c| c.buffers.len()).collect())
+    pub(crate) fn gpu_mut(&mut self) -> &mut Gpu {
+        &mut self.gpu
     }
 
     /// Takes `part` for changed.
-    pub(crate) fn forget(&mut self, part: Part) {
+    pub(crate) fn invalidate(&mut self, part: Part) {
         match part {
             Part::Mesh => (self.cells, self.points, self.values) = (None, None, None),
             Part::Points => self.points = None,
@@ -177,7 +172,7 @@ impl Traverse {
     /// Those of [`Gpu::check`] and [`Buffer::new`].
     pub(crate) fn upload<const N: usize>(
         &mut self,
-        geometry: &Geometry,
+        geometry: &TetMesh,
         values: &Values<N>,
         exact: &Exact<f32>,
     ) -> Result<()> {
@@ -206,8 +201,8 @@ impl Traverse {
     /// Has the device hold `table`, or build it, unless it does.
     ///
     /// # Errors
-    /// Those of [`table::Held::prepare`].
-    pub(crate) fn prepare_table(&mut self, exact: &Exact<f32>, table: Option<&Arc<Lookup>>) -> Result<()> {
+    /// Those of [`table::TableCache::prepare`].
+    pub(crate) fn prepare_table(&mut self, exact: &Exact<f32>, table: Option<&Arc<PreintegratedTable>>) -> Result<()> {
         let function = match self.function.take() {
             Some(function) => function,
             None => function::upload(&self.gpu, exact)?,
@@ -219,29 +214,23 @@ impl Traverse {
     ///
     /// # Errors
     /// Those of [`Gpu::check`] and [`Buffer::new`].
-    pub(crate) fn render<const N: usize>(
-        &mut self,
-        geometry: &Geometry,
-        values: &Values<N>,
-        exact: &Exact<f32>,
-        table: Option<&Arc<Lookup>>,
-        view: &View,
-    ) -> Result<Drawn> {
+    pub(crate) fn render<const N: usize>(&mut self, scene: &DeviceScene<'_, N>) -> Result<WalkedFrame> {
+        let DeviceScene { geometry, values, exact, table, view } = *scene;
         self.upload(geometry, values, exact)?;
         self.prepare_table(exact, table)?;
         let association = arrays::association(values);
         let arrays = self.arrays()?;
-        let variant = Variant { kind: exact.kind, direct: exact.direct };
+        let variant = ShaderVariant { kind: exact.kind, direct: exact.direct };
         let source = program(&variant, association, view.blend(), table.map(|t| &**t), &arrays);
         if self.program.as_ref().is_none_or(|p| p.0 != source) {
             let bindings = arrays.iter().map(|a| a.chunks).sum();
-            let layout = shader::group_layout(&self.gpu, &vec![Binding::Read; bindings]);
-            let pipeline = {
-                let tables = table.is_some().then_some(&self.tables);
-                let layouts: Vec<_> = [&self.layout, &layout].into_iter().chain(tables).collect();
-                shader::compile(&self.gpu, "traverse", &source, &layouts)
-            };
-            self.gpu.check()?;
+            let gpu = &self.gpu;
+            let layout = raster::layout(gpu, Stages::COMPUTE, &vec![Slot::Read; bindings]);
+            let tables = table.is_some().then_some(Some(&self.tables));
+            let layouts: Vec<_> = [Some(&self.layout), Some(&layout)].into_iter().chain(tables).collect();
+            let module = raster::module(gpu, "traverse", &source);
+            let pipeline = raster::compute(gpu, &module, "main", &raster::pipeline_layout(gpu, &layouts));
+            gpu.check()?;
             self.program = Some((source, pipeline, layout));
         }
         self.draw(geometry, table.is_some(), view)
@@ -260,15 +249,11 @@ impl Traverse {
     }
 
     /// The arrays of group 1, in the order of [`Self::chunks`].
-    fn arrays(&self) -> Result<[Array; 6]> {
-        let chunks = self.chunks()?;
-        Ok(std::array::from_fn(|i| {
-            let (name, element) = ARRAYS[i];
-            Array { name, element, chunks: chunks[i].buffers.len(), shift: chunks[i].shift }
-        }))
+    fn arrays(&self) -> Result<[ShaderArray; 6]> {
+        Ok(arrays::named(ARRAYS, self.chunks()?))
     }
 
-    fn chunks(&self) -> Result<[&Chunks; 6]> {
+    pub(crate) fn chunks(&self) -> Result<[&Chunks; 6]> {
         match (&self.cells, &self.points, &self.values) {
             (Some([cells, faces]), Some([points, volumes, boxes]), Some(values)) => {
                 Ok([cells, faces, points, volumes, boxes, values])
@@ -277,7 +262,7 @@ impl Traverse {
         }
     }
 
-    fn draw(&self, geometry: &Geometry, tabulated: bool, view: &View) -> Result<Drawn> {
+    fn draw(&self, geometry: &TetMesh, tabulated: bool, view: &View) -> Result<WalkedFrame> {
         let gpu = &self.gpu;
         let (Some(function), Some((_, pipeline, group_layout))) = (&self.function, &self.program) else {
             return Err(Error::Render("the device does not hold the transfer function".into()));
@@ -286,7 +271,7 @@ impl Traverse {
         let fan = view.fan(geometry.centre, geometry.scale, NEAR_EYE);
         let planes = rays::planes(view, geometry, DVec3::ZERO);
         let ends = rays::ends(view, &fan, geometry.scale, true);
-        let frame = Frame {
+        let frame = RayUniforms {
             origin: rays::affine(fan.by_pixel(fan.origin, [w, h])),
             direction: rays::affine(fan.by_pixel(fan.direction, [w, h])),
             size: [w, h],
@@ -299,35 +284,39 @@ impl Traverse {
             leaves: geometry.boundary.boxes().len().div_ceil(2) as u32,
             faces: geometry.boundary.faces.len() as u32,
             most_steps: geometry.cells.len() as u32,
-            most_work: if gpu.adapter.kind == "CPU" { LLVMPIPE_WORK } else { u32::MAX },
+            most_work: if gpu.adapter.is_software() { LLVMPIPE_WORK } else { u32::MAX },
         };
         let rows = (RAYS / u64::from(w)).clamp(1, u64::from(h)) as u32;
         let size = u64::from(w) * u64::from(rows) * 16;
-        let frame_buffer = Buffer::new(gpu, "frame", size_of::<Frame>() as u64, Usage::UNIFORM | Usage::COPY_DST)?;
+        let frame_buffer =
+            Buffer::new(gpu, "frame", size_of::<RayUniforms>() as u64, Usage::UNIFORM | Usage::COPY_DST)?;
         let planes = Buffer::holding(gpu, "planes", &planes, Usage::STORAGE)?;
         let ends = Buffer::holding(gpu, "ends", &ends, Usage::STORAGE)?;
         let pixels = Buffer::new(gpu, "pixels", size, Usage::STORAGE | Usage::COPY_SRC)?;
         let counts = Buffer::new(gpu, "counts", 16, Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST)?;
-        let back = Buffer::new(gpu, "readback", size + 32, Usage::COPY_DST | Usage::MAP_READ)?;
+        let back = Readback::new(gpu, size + 32)?;
         let [parameters, knots, buckets] = function;
         let own = [parameters, knots, buckets, &frame_buffer, &planes, &ends, &pixels, &counts];
-        let own = shader::group(gpu, &self.layout, own);
-        let shared = shader::group(gpu, group_layout, self.chunks()?.into_iter().flat_map(|c| &c.buffers));
+        let own = raster::group_of(gpu, &self.layout, own);
+        let shared = raster::group_of(gpu, group_layout, self.chunks()?.into_iter().flat_map(|c| &c.buffers));
         let tables = self.table.get().filter(|_| tabulated);
         let tables = tables.map(|t| raster::group(gpu, &self.tables, t.bindings()));
-        let clock = Clock::new(gpu)?;
+        let clock = Clock::of_one_pass(gpu)?;
 
-        let mut drawn =
-            Drawn { pixels: Vec::with_capacity(w as usize * h as usize), counts: Counts::default(), device_ms: None };
+        let mut drawn = WalkedFrame {
+            pixels: Vec::with_capacity(w as usize * h as usize),
+            counts: Counts::default(),
+            device_ms: None,
+        };
         for first_row in (0..h).step_by(rows as usize) {
             let rows = rows.min(h - first_row);
-            frame_buffer.write(gpu, 0, bytemuck::bytes_of(&Frame { first_row, rows, ..frame }));
+            frame_buffer.write(gpu, 0, bytemuck::bytes_of(&RayUniforms { first_row, rows, ..frame }));
             let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
             encoder.clear_buffer(&counts.raw, 0, None);
             {
                 let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
                     label: Some("traverse"),
-                    timestamp_writes: clock.as_ref().map(Clock::writes),
+                    timestamp_writes: clock.as_ref().and_then(|c| c.compute(0)),
                 });
                 pass.set_pipeline(pipeline);
                 pass.set_bind_group(0, &own, &[]);
@@ -337,71 +326,36 @@ impl Traverse {
                 }
                 pass.dispatch_workgroups(w.div_ceil(8), rows.div_ceil(8), 1);
             }
-            encoder.copy_buffer_to_buffer(&pixels.raw, 0, &back.raw, 0, size);
-            encoder.copy_buffer_to_buffer(&counts.raw, 0, &back.raw, size, 16);
+            encoder.copy_buffer_to_buffer(&pixels.raw, 0, back.raw(), 0, size);
+            encoder.copy_buffer_to_buffer(&counts.raw, 0, back.raw(), size, 16);
             if let Some(clock) = &clock {
-                clock.resolve(&mut encoder, &back, size + 16);
+                clock.resolve_one_pass(&mut encoder, back.raw(), size + 16);
             }
-            let mapped = Arc::new(AtomicBool::new(false));
-            let done = Arc::clone(&mapped);
-            encoder.map_buffer_on_submit(&back.raw, wgpu::MapMode::Read, .., move |r| done.store(r.is_ok(), Relaxed));
-            gpu.queue.submit([encoder.finish()]);
-            gpu.wait()?;
-            if !mapped.load(Relaxed) {
-                return Err(Error::Lost(format!("{} does not hand its pixels back", gpu.adapter.name)));
-            }
-            {
-                let failed = |e| Error::Lost(format!("{} does not hand its pixels back: {e}", gpu.adapter.name));
-                let bytes = back.raw.get_mapped_range(..).map_err(failed)?;
+            back.submit(gpu, encoder, |bytes| {
                 let (image, rest) = bytes.split_at(size as usize);
                 drawn.pixels.extend_from_slice(&bytemuck::cast_slice(image)[..w as usize * rows as usize]);
                 let c: RawCounts = bytemuck::pod_read_unaligned(&rest[..16]);
                 drawn.counts.steps += u64::from(c.carry) << 32 | u64::from(c.steps);
-                drawn.counts.repaired += u64::from(c.repaired);
+                drawn.counts.retraced += u64::from(c.retraced);
                 if clock.is_some() {
                     let [start, end]: [u64; 2] = bytemuck::pod_read_unaligned(&rest[16..32]);
                     let ms = end.saturating_sub(start) as f64 * f64::from(gpu.queue.get_timestamp_period()) / 1e6;
                     drawn.device_ms = Some(drawn.device_ms.unwrap_or(0.0) + ms);
                 }
-            }
-            back.raw.unmap();
+            })?;
         }
         Ok(drawn)
     }
 }
 
-/// Measures a pass, where the device can.
-struct Clock {
-    queries: wgpu::QuerySet,
-    resolved: Buffer,
-}
-
-impl Clock {
-    fn new(gpu: &Gpu) -> Result<Option<Self>> {
-        if !gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
-            return Ok(None);
-        }
-        let descriptor = wgpu::QuerySetDescriptor { label: None, ty: wgpu::QueryType::Timestamp, count: 2 };
-        let queries = gpu.device.create_query_set(&descriptor);
-        Ok(Some(Clock { queries, resolved: Buffer::new(gpu, "clock", 16, Usage::QUERY_RESOLVE | Usage::COPY_SRC)? }))
-    }
-
-    fn writes(&self) -> wgpu::ComputePassTimestampWrites<'_> {
-        wgpu::ComputePassTimestampWrites {
-            query_set: &self.queries,
-            beginning_of_pass_write_index: Some(0),
-            end_of_pass_write_index: Some(1),
-        }
-    }
-
-    fn resolve(&self, encoder: &mut wgpu::CommandEncoder, into: &Buffer, offset: u64) {
-        encoder.resolve_query_set(&self.queries, 0..2, &self.resolved.raw, 0);
-        encoder.copy_buffer_to_buffer(&self.resolved.raw, 0, &into.raw, offset, 16);
-    }
-}
-
 /// The whole program.
-fn program(variant: &Variant, association: &str, blend: Blend, table: Option<&Lookup>, arrays: &[Array]) -> String {
+fn program(
+    variant: &ShaderVariant,
+    association: &str,
+    blend: Blend,
+    table: Option<&PreintegratedTable>,
+    arrays: &[ShaderArray],
+) -> String {
     let mut text = shader::prelude(variant);
     for (name, value) in [
         ("FAR", f64::from(FAR)),
@@ -410,8 +364,8 @@ fn program(variant: &Variant, association: &str, blend: Blend, table: Option<&Lo
         ("BLUR", f64::from(BLUR)),
         ("SLACK", f64::from(MARGIN)),
         ("CLOSE", f64::from(CLOSE)),
-        ("ASIDE", f64::from(ASIDE)),
-        ("LEAST_LIGHT", f64::from(least_light(variant.direct))),
+        ("PERTURBATION", f64::from(PERTURBATION)),
+        ("LEAST_TRANSMITTANCE", f64::from(least_transmittance(variant.direct))),
     ] {
         text += &format!("const {name} = {value:?}f;\n");
     }

@@ -1,13 +1,7 @@
 //! What the tests of the engines share: the engines, scenes to draw, and a report that shows what differs.
 
 #![allow(dead_code, reason = "each test uses a part")]
-#![allow(
-    clippy::expect_used,
-    clippy::unwrap_used,
-    clippy::panic,
-    clippy::print_stderr,
-    reason = "a test fails by panicking, and tells what it measured"
-)]
+#![allow(clippy::expect_used, clippy::unwrap_used, clippy::panic, clippy::print_stderr, reason = "tests")]
 
 pub(crate) mod draw;
 pub(crate) mod shared;
@@ -32,7 +26,7 @@ pub(crate) enum Engine {
     Sweep { threads: usize },
     /// An engine on the device to test: see [`on_device`]. Draws nothing if there is none.
     Device(render::Engine),
-    /// The judge itself, for the tests that know the answer without it.
+    /// The reference itself, for the tests that know the answer without it.
     Reference,
 }
 

@@ -263,7 +263,7 @@ fn a_mesh_alone() {
     let stats: serde_json::Value = serde_json::from_slice(&std::fs::read(place.path("x.json")).unwrap()).unwrap();
     assert_eq!((&stats["cells"], &stats["tetrahedra"]), (&9.into(), &48.into()), "{stats}");
     for key in
-        ["load_ms", "faces_ms", "upload_ms", "first_frame_ms", "frame_ms", "steps", "device_bytes", "repaired_rays"]
+        ["load_ms", "faces_ms", "upload_ms", "first_frame_ms", "frame_ms", "steps", "device_bytes", "retraced_rays"]
     {
         assert!(stats[key].is_number(), "{key}: {stats}");
     }
@@ -347,8 +347,8 @@ fn variants_of_the_projection_engine() {
     let exact = variants.iter().find(|v| v["variant"] == "intersected, exact").unwrap();
     assert!(variants.len() > 12 && exact["rmse"].as_f64().unwrap() < 1e-2, "{study}");
     // What a scene asks for can be switched off.
-    let switches = r#""engine": "project", "projection": {"target": "rgba8", "dither": true}, "size""#;
-    place.write("dithered.json", &SCENE.replace("\"size\"", switches));
+    let options = r#""engine": "project", "projection": {"target": "rgba8", "dither": true}, "size""#;
+    place.write("dithered.json", &SCENE.replace("\"size\"", options));
     let draw = |options: &str| {
         place.succeeds(&format!("render dithered.json --out a.npy {options}"));
         std::fs::read(place.path("a.npy")).unwrap()

@@ -34,8 +34,8 @@ fn minus_one_is_a_number() {
     // Nor are lists that start with it taken for options.
     for (option, part) in [
         ("--size -1x5", "width x height"),
-        ("--background -1,0,0", "red, green and blue are 0 to 1"),
-        ("--nan-color -1,0,0", "red, green and blue are 0 to 1"),
+        ("--background -1,0,0", "red, green and blue must be from 0 to 1"),
+        ("--nan-color -1,0,0", "red, green and blue must be from 0 to 1"),
         ("--scale -1,1,1", "above 0"),
         ("--scale 1,1,1e40", "1e-30 to 1e30"),
         ("--shade=-1,1,1,1", "0 or more"),

@@ -58,7 +58,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     }
     let given = options.request.scene()?;
     let choice = options.request.device(given.as_ref()).or_environment();
-    // Engine and switches of a scene hold for all devices.
+    // Engine and projection options of a scene hold for all devices.
     let scene = given.clone();
     let mut renderer = options.request.renderer(threads, scene.as_ref(), choice.clone())?;
     let job = renderer.install(|| render::prepare(&options.request, given))?;

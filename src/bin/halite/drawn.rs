@@ -59,7 +59,7 @@ pub(crate) fn report(s: &Stats, times: &Times, size: [u32; 2], frame_ms: f64) ->
         "load_ms": times.load, "faces_ms": times.split + s.faces_ms, "upload_ms": s.upload_ms,
         "first_frame_ms": times.first_frame, "frame_ms": frame_ms, "transfer_edit_ms": times.transfer_edit,
         "integral": s.integral, "table_ms": s.table_ms, "table_bytes": s.table_bytes, "knots_per_cell": s.knots_per_cell,
-        "steps": s.steps, "repaired_rays": s.repaired_rays, "cpu_rays": s.cpu_rays, "panels": s.panels,
+        "steps": s.steps, "retraced_rays": s.retraced_rays, "cpu_rays": s.cpu_rays, "panels": s.panels,
         "culled_cells": s.culled_cells, "culling_ms": s.culling_ms,
         "device_ms": s.device_ms, "uploaded_bytes": s.uploaded_bytes, "device_bytes": s.device_bytes,
         "peak_bytes": peak_bytes(), "projection": s.projection, "sweep": s.sweep,

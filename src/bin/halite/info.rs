@@ -4,7 +4,7 @@ use crate::{input, output, parse, progress};
 use anyhow::Result;
 use clap::Args;
 use halite::field::{Association, Gradient};
-use halite::geometry::Geometry;
+use halite::geometry::TetMesh;
 use halite::geometry::contacts::Contacts;
 use halite::io::DataSet;
 use halite::mesh::cells::{self, Listed, Tetrahedra};
@@ -151,7 +151,7 @@ fn describe(out: &mut String, mesh: &Mesh, (times, step): (&[f64], usize)) -> Re
     let mut row = |count: usize, what: &str| if count > 0 { writeln!(out, "  {count:>12}  {what}") } else { Ok(()) };
     let points = tetrahedra.points(mesh.points());
     let faces = Faces::new(&points, &tetrahedra.corners);
-    let geometry = Geometry::new(&points, &tetrahedra, &faces);
+    let geometry = TetMesh::new(&points, &tetrahedra, &faces);
     let contacts = Contacts::new(&geometry);
     let skipped = &tetrahedra.skipped;
     row(tetrahedra.cells, "cells")?;

@@ -4,7 +4,7 @@ use crate::output::misuse;
 use crate::variant::{named, table};
 use anyhow::{Result, anyhow};
 use clap::Args;
-use halite::integral::choice::{Alpha, Build, Choice, Culling, MOST_PIECES, Planes, Texels, Two, Weights};
+use halite::integral::options::{Alpha, Build, Culling, IntegrationOptions, MOST_PIECES, Planes, Texels, Two, Weights};
 use halite::integral::table::Kind;
 use halite::scene::{Scene, integral};
 use std::path::Path;
@@ -59,14 +59,14 @@ pub(crate) struct Integral {
 
 /// A form, or a method of two variables, that there is.
 fn by_name(name: &str) -> Result<String, String> {
-    Choice::default().named(name).map(|_| name.to_owned())
+    IntegrationOptions::default().named(name).map(|_| name.to_owned())
 }
 
 impl Integral {
     /// `choice`, with what was said in its place.
-    pub(crate) fn apply(&self, choice: Choice) -> Choice {
+    pub(crate) fn apply(&self, choice: IntegrationOptions) -> IntegrationOptions {
         let choice = self.integral.as_deref().and_then(|name| choice.named(name).ok()).unwrap_or(choice);
-        Choice {
+        IntegrationOptions {
             form: choice.form,
             table: self.table.or(choice.table),
             lengths: self.lengths.unwrap_or(choice.lengths),
@@ -106,7 +106,7 @@ impl Integral {
     }
 
     /// Refuses a size that was given and that tables as `choice` says cannot have.
-    pub(crate) fn check(&self, choice: &Choice) -> Result<()> {
+    pub(crate) fn check(&self, choice: &IntegrationOptions) -> Result<()> {
         match self.table {
             Some(_) => choice.check(choice.size(0)).map_err(|e| misuse(format!("--table: {e}"))),
             None => Ok(()),
@@ -115,7 +115,7 @@ impl Integral {
 }
 
 /// A scene's "integral": the name of a form, or an object.
-pub(crate) fn of_scene(scene: &Scene, path: &Path) -> Result<Choice> {
-    let Some(value) = &scene.integral else { return Ok(Choice::default()) };
+pub(crate) fn of_scene(scene: &Scene, path: &Path) -> Result<IntegrationOptions> {
+    let Some(value) = &scene.integral else { return Ok(IntegrationOptions::default()) };
     integral(value).map_err(|what| anyhow!("{}: integral: {what}", path.display()))
 }

@@ -27,17 +27,17 @@ pub(crate) fn vector(text: &str) -> Result<DVec3, String> {
 pub(crate) fn factors(text: &str) -> Result<DVec3, String> {
     let factors = vector(text)?;
     if factors.cmple(DVec3::ZERO).any() {
-        return Err("all three factors are above 0".into());
+        return Err("all three factors must be above 0".into());
     }
     if factors.cmplt(DVec3::splat(1e-30)).any() || factors.cmpgt(DVec3::splat(1e30)).any() {
-        return Err("all three factors are 1e-30 to 1e30".into());
+        return Err("all three factors must be from 1e-30 to 1e30".into());
     }
     Ok(factors)
 }
 
 /// A whole number from 0.
 pub(crate) fn count(text: &str) -> Result<usize, String> {
-    text.trim().parse().map_err(|_| "it is a whole number from 0".into())
+    text.trim().parse().map_err(|_| "it must be a whole number from 0".into())
 }
 
 /// A number of threads, 0 for one for each core.
@@ -53,7 +53,7 @@ pub(crate) fn name(text: &str) -> Result<String, String> {
 
 /// A number above 0.
 pub(crate) fn positive(text: &str) -> Result<f64, String> {
-    number(text).and_then(|n| if n > 0.0 { Ok(n) } else { Err("it is above 0".into()) })
+    number(text).and_then(|n| if n > 0.0 { Ok(n) } else { Err("it must be above 0".into()) })
 }
 
 /// A factor above 0.
@@ -64,14 +64,14 @@ pub(crate) fn gain(text: &str) -> Result<f32, String> {
 
 /// A number of 0 or more.
 pub(crate) fn not_negative(text: &str) -> Result<f64, String> {
-    number(text).and_then(|n| if n >= 0.0 { Ok(n) } else { Err("it is 0 or more".into()) })
+    number(text).and_then(|n| if n >= 0.0 { Ok(n) } else { Err("it must be 0 or more".into()) })
 }
 
 /// `AMBIENT,DIFFUSE,SPECULAR,POWER`, all at least 0
 pub(crate) fn shade(text: &str) -> Result<Shade, String> {
     let [ambient, diffuse, specular, power] = numbers(text)?;
     if [ambient, diffuse, specular, power].iter().any(|x| *x < 0.0) {
-        return Err("the shares of ambient, diffuse and specular light and the power are 0 or more".into());
+        return Err("the shares of ambient, diffuse and specular light and the power must be 0 or more".into());
     }
     Ok(Shade { ambient, diffuse, specular, power, ..Shade::default() })
 }
@@ -92,14 +92,14 @@ pub(crate) fn size(text: &str) -> Result<[u32; 2], String> {
 pub(crate) fn range(text: &str) -> Result<[f64; 2], String> {
     let (lo, hi) = text.split_once(':').ok_or("a range is two numbers, such as 0:1")?;
     let range = [number(lo)?, number(hi)?];
-    if range[0] < range[1] { Ok(range) } else { Err("the first number is below the second".into()) }
+    if range[0] < range[1] { Ok(range) } else { Err("the first number must be below the second".into()) }
 }
 
 /// `0`, `1`, … or `magnitude`
 pub(crate) fn component(text: &str) -> Result<Component, String> {
     match text {
         "magnitude" => Ok(Component::Magnitude),
-        _ => text.parse().map(Component::Index).map_err(|_| "it is an index from 0, or \"magnitude\"".into()),
+        _ => text.parse().map(Component::Index).map_err(|_| "it must be an index from 0, or \"magnitude\"".into()),
     }
 }
 
@@ -128,7 +128,7 @@ pub(crate) fn background(text: &str) -> Result<Background, String> {
         _ => {
             let color = numbers(text)?;
             if !color.iter().all(|c| (0.0..=1.0).contains(c)) {
-                return Err("red, green and blue are 0 to 1".into());
+                return Err("red, green and blue must be from 0 to 1".into());
             }
             Background::Color(color)
         }
@@ -144,9 +144,9 @@ pub(crate) fn color_and_opacity(text: &str) -> Result<([f64; 3], Option<f64>), S
         _ => return Err(format!("{} numbers, not red, green, blue and perhaps an opacity", list.len())),
     };
     if !color.iter().all(|c| (0.0..=1.0).contains(c)) {
-        return Err("red, green and blue are 0 to 1".into());
+        return Err("red, green and blue must be from 0 to 1".into());
     }
-    if opacity.is_some_and(|a| a < 0.0) { Err("the opacity is 0 or more".into()) } else { Ok((color, opacity)) }
+    if opacity.is_some_and(|a| a < 0.0) { Err("the opacity must be 0 or more".into()) } else { Ok((color, opacity)) }
 }
 
 /// `X,Y,Z,NX,NY,NZ`
@@ -179,13 +179,6 @@ pub(crate) fn opacity(text: &str) -> Result<Opacity, String> {
         Ok((place, number(a)?))
     };
     text.split(',').map(knot).collect::<Result<_, String>>().map(Opacity)
-}
-
-/// An order of reconstruction, by its name.
-pub(crate) fn order(text: &str) -> Result<halite::cast::Order, String> {
-    let all = halite::cast::Order::ALL;
-    let found = all.iter().find(|(name, _)| *name == text).map(|(_, order)| *order);
-    found.ok_or_else(|| format!("there is {}", all.map(|(name, _)| name).join(", ")))
 }
 
 /// Where samples are taken along rays.

@@ -10,10 +10,10 @@ use halite::cast::{Order, Reconstruction, Sampling};
 use halite::field::{Association, Component, Field, Kind};
 use halite::gpu::DeviceChoice;
 use halite::grid::Grid;
-use halite::integral::choice::{Choice, Form};
+use halite::integral::options::{Form, IntegrationOptions};
 use halite::io::Time;
 use halite::mesh::{Mesh, cells::Tetrahedra};
-use halite::project::Switches;
+use halite::project::ProjectionOptions;
 use halite::render::{Engine, Renderer};
 use halite::scene::{Scalars, Scene, automatic, missing};
 use halite::view::{Blend, ClippingPlane, Cropping, REGIONS};
@@ -59,7 +59,7 @@ pub(crate) struct Request {
     pub(crate) size: Option<[u32; 2]>,
     /// What stands for the field of a regular or rectilinear grid between samples: itself, parabolas, lines, or rectangles
     /// by the middle, the left or the right sample [default: exact]
-    #[arg(long, value_name = "ORDER", value_parser = parse::order)]
+    #[arg(long, value_name = "ORDER")]
     reconstruction: Option<Order>,
     /// Where such samples are: at faces of voxels and midway, or so many world units apart [default: voxels]
     #[arg(long, value_name = "voxels|LENGTH", value_parser = parse::sampling)]
@@ -370,15 +370,19 @@ impl Request {
         }
     }
 
-    /// A renderer on `device`, with the engine and its switches that were asked for.
+    /// A renderer on `device`, with the engine and the options of projection that were asked for.
     pub(crate) fn renderer(&self, threads: usize, scene: Option<&Scene>, device: DeviceChoice) -> Result<Renderer> {
         let engine = self.engine.or(scene.and_then(|s| s.engine)).unwrap_or_default();
         let others = self.variant.given().join(", ");
         if !others.is_empty() && !matches!(engine, Engine::Project) {
             if self.engine.is_some() {
-                return Err(output::misuse(format!("the projection engine alone has {others}: --engine project")));
+                return Err(output::misuse(format!(
+                    "{others}: only the projection engine has this; add --engine project"
+                )));
             }
-            tracing::warn!("the projection engine alone has {others}, and it does not draw: --engine project");
+            tracing::warn!(
+                "{others}: only the projection engine has this, and another engine draws; add --engine project"
+            );
         }
         let mut renderer = Renderer::with_engine(threads, device, engine)?;
         let of_scene = scene.and_then(|s| s.reconstruction).unwrap_or_default();
@@ -390,15 +394,15 @@ impl Request {
             ));
         }
         renderer.set_reconstruction(Reconstruction { order, sampling });
-        let switches = scene.map_or(Ok(Switches::default()), |s| variant::of_scene(s, &self.input))?;
-        renderer.set_switches(self.variant.apply(switches));
+        let projection = scene.map_or(Ok(ProjectionOptions::default()), |s| variant::of_scene(s, &self.input))?;
+        renderer.set_projection(self.variant.apply(projection));
         renderer.set_integral(self.choice(scene)?);
         Ok(renderer)
     }
 
     /// The form of the integral that was asked for.
-    pub(crate) fn choice(&self, scene: Option<&Scene>) -> Result<Choice> {
-        let choice = scene.map_or(Ok(Choice::default()), |s| integral::of_scene(s, &self.input))?;
+    pub(crate) fn choice(&self, scene: Option<&Scene>) -> Result<IntegrationOptions> {
+        let choice = scene.map_or(Ok(IntegrationOptions::default()), |s| integral::of_scene(s, &self.input))?;
         let choice = self.integral.apply(choice);
         self.integral.check(&choice)?;
         Ok(choice)
@@ -413,11 +417,11 @@ impl Request {
         let given: Vec<_> = engine.into_iter().chain(self.variant.given()).chain(self.integral.given()).collect();
         if !given.is_empty() {
             let given = given.join(", ");
-            return Err(output::misuse(format!("study draws all variants, and leaves no choice by {given}")));
+            return Err(output::misuse(format!("{given}: study draws all variants, so none can be chosen")));
         }
-        let choice = scene.map_or(Ok(Choice::default()), |s| integral::of_scene(s, &self.input))?;
+        let choice = scene.map_or(Ok(IntegrationOptions::default()), |s| integral::of_scene(s, &self.input))?;
         let choice = self.integral.apply(choice);
-        self.integral.check(&Choice { form: Form::Volume, ..choice })?;
+        self.integral.check(&IntegrationOptions { form: Form::Volume, ..choice })?;
         let left: Vec<_> = scene.map_or(vec![], |s| {
             let said = [("projection", s.projection.is_some()), ("integral", s.integral.is_some())];
             said.into_iter().filter_map(|(key, said)| said.then_some(key)).collect()

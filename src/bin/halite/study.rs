@@ -13,9 +13,9 @@ use embedded_graphics::prelude::{DrawTarget, Drawable, OriginDimensions, Pixel, 
 use embedded_graphics::text::{Baseline, Text};
 use halite::gpu::DeviceChoice;
 use halite::image::{Backdrop, Image};
-use halite::integral::choice::{Choice, Form, Texels};
+use halite::integral::options::{Form, IntegrationOptions, Texels};
 use halite::integral::table::Kind;
-use halite::project::{Fragments, Order, Switches, Target, Thickness};
+use halite::project::{Fragments, Order, ProjectionOptions, Target, Thickness};
 use halite::render::Renderer;
 use halite::view::View;
 use serde_json::json;
@@ -67,8 +67,8 @@ pub(crate) struct Options {
 struct Variant {
     name: &'static str,
     place: &'static str,
-    switches: Switches,
-    integral: Choice,
+    projection: ProjectionOptions,
+    integral: IntegrationOptions,
 }
 
 /// What a variant gave.
@@ -95,34 +95,35 @@ const LINES: usize = 24;
 
 /// From the fewest enhancements to the most, then what else can be switched; with tables of this size, if it was said.
 fn variants(table: Option<[u32; 3]>) -> Vec<Variant> {
-    let best = Switches::default();
-    let volume = |lengths, texels| Choice { lengths, texels, table, ..Choice::of(Form::Volume) };
+    let best = ProjectionOptions::default();
+    let volume =
+        |lengths, texels| IntegrationOptions { lengths, texels, table, ..IntegrationOptions::of(Form::Volume) };
     let (uniform, log) = (volume(Kind::Uniform, Texels::Unorm16), volume(Kind::Log, Texels::Unorm16));
-    let interpolated = Switches { fragments: Fragments::Interpolated, ..best };
-    let linear = Switches { fragments: Fragments::Linear, ..best };
-    let eight = |switches| Switches { target: Target::Rgba8, ..switches };
+    let interpolated = ProjectionOptions { fragments: Fragments::Interpolated, ..best };
+    let linear = ProjectionOptions { fragments: Fragments::Linear, ..best };
+    let eight = |projection| ProjectionOptions { target: Target::Rgba8, ..projection };
     let frame_buffer = eight(interpolated);
-    let exact = Choice::default();
-    let variant = |name, place, switches, integral| Variant { name, place, switches, integral };
+    let exact = IntegrationOptions::default();
+    let variant = |name, place, projection, integral| Variant { name, place, projection, integral };
     vec![
         variant("basic", "table 1 i", eight(linear), volume(Kind::Uniform, Texels::Unorm8)),
         variant("+ perspective", "table 1 ii", frame_buffer, volume(Kind::Uniform, Texels::Unorm8)),
         variant("+ 16-bit table", "table 1 iii", frame_buffer, uniform),
         variant("+ logarithmic", "table 1 iv, figure 9a", frame_buffer, log),
-        variant("+ alpha dithering", "table 1, figure 9b", Switches { dither: true, ..frame_buffer }, log),
+        variant("+ alpha dithering", "table 1, figure 9b", ProjectionOptions { dither: true, ..frame_buffer }, log),
         variant("+ 32-bit float target", "table 1, figures 7c 8b 9c 10b", interpolated, log),
-        variant("16-bit float target", "", Switches { target: Target::Rgba16float, ..interpolated }, log),
+        variant("16-bit float target", "", ProjectionOptions { target: Target::Rgba16float, ..interpolated }, log),
         variant("8-bit table", "figure 7a", interpolated, volume(Kind::Log, Texels::Unorm8)),
         variant("8-bit target", "figure 7b", frame_buffer, log),
         variant("screen-linear", "figure 8a", linear, log),
-        variant("thickness by depth", "", Switches { thickness: Thickness::Depth, ..interpolated }, log),
+        variant("thickness by depth", "", ProjectionOptions { thickness: Thickness::Depth, ..interpolated }, log),
         variant("uniform thickness", "figure 10a", interpolated, uniform),
         variant("log-normalised, float", "", interpolated, volume(Kind::LogNormalised, Texels::Float)),
         variant("interpolated, exact", "", interpolated, exact),
         variant("intersected, exact", "", best, exact),
-        variant("by depth", "", Switches { order: Order::Depth, ..best }, exact),
-        variant("by circumspheres", "", Switches { order: Order::Circumsphere, ..best }, exact),
-        variant("not sorted", "", Switches { order: Order::None, ..best }, exact),
+        variant("by depth", "", ProjectionOptions { order: Order::Depth, ..best }, exact),
+        variant("by circumspheres", "", ProjectionOptions { order: Order::Circumsphere, ..best }, exact),
+        variant("not sorted", "", ProjectionOptions { order: Order::None, ..best }, exact),
     ]
 }
 
@@ -150,13 +151,13 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     let given = options.request.scene()?;
     let size = options.request.studied(given.as_ref())?.or(Some([256, 256, 16]));
     let device = options.request.device(given.as_ref());
-    let mut judge = Renderer::with_device(threads, DeviceChoice::Cpu)?;
-    let job = judge.install(|| render::prepare(&options.request, given)?.of_mesh("study"))?;
+    let mut reference = Renderer::with_device(threads, DeviceChoice::Cpu)?;
+    let job = reference.install(|| render::prepare(&options.request, given)?.of_mesh("study"))?;
     let (view, _) = job.scene.view()?;
     let mut renderer = Renderer::with_engine(threads, device, halite::render::Engine::Project)?;
     let truth = progress::during("judging", |p| {
-        set(&mut judge, &job)?;
-        judge.render(&view, p)
+        set(&mut reference, &job)?;
+        reference.render(&view, p)
     })?;
     set(&mut renderer, &job)?;
     let all = variants(size);
@@ -183,7 +184,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
             .iter()
             .map(|r| {
                 json!({
-                    "variant": r.variant.name, "stands_in": r.variant.place, "switches": r.variant.switches,
+                    "variant": r.variant.name, "stands_in": r.variant.place, "switches": r.variant.projection,
                     "integral": r.variant.integral,
                     "max": r.max, "rmse": r.rmse, "order_ms": r.order_ms, "project_ms": r.project_ms, "frame_ms": r.frame_ms,
                     "drawn_cells": r.cells, "fragments": r.fragments, "tetrahedra_per_s": r.rate(tetrahedra),
@@ -213,16 +214,20 @@ fn set(renderer: &mut Renderer, job: &Job) -> halite::Result<()> {
 fn draw(variant: Variant, frames: u32, renderer: &mut Renderer, view: &View, truth: &Image) -> halite::Result<Row> {
     renderer.set_integral(variant.integral);
     // Whatever the last variant left: each sorts for itself, and finds the sequence of the mesh if it draws in such.
-    let other = match variant.switches.order {
+    let other = match variant.projection.order {
         Order::MpvoConvex => Order::Mpvonc,
         Order::Mpvo | Order::Mpvonc | Order::Xmpvo => Order::MpvoConvex,
         Order::Depth | Order::Circumsphere | Order::None => Order::None,
     };
-    renderer.set_switches(Switches { order: other, fragments: Fragments::Intersected, ..variant.switches });
-    if variant.switches.order != Order::None {
+    renderer.set_projection(ProjectionOptions {
+        order: other,
+        fragments: Fragments::Intersected,
+        ..variant.projection
+    });
+    if variant.projection.order != Order::None {
         renderer.render(view, &|_| ())?;
     }
-    renderer.set_switches(variant.switches);
+    renderer.set_projection(variant.projection);
     let image = renderer.render(view, &|_| ())?;
     let order_ms = renderer.stats().projection.map_or(0.0, |p| p.order_ms);
     let row = Row::measured(variant, image, truth, frames, renderer, view)?;

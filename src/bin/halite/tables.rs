@@ -5,7 +5,7 @@ use crate::{output, parse, progress};
 use anyhow::{Context, Result};
 use clap::Args;
 use halite::field::Kind;
-use halite::geometry::Geometry;
+use halite::geometry::TetMesh;
 use halite::gpu::DeviceChoice;
 use halite::gpu::construct::{Construction, Constructor};
 use halite::image::{Backdrop, Image};
@@ -77,7 +77,7 @@ struct Form<'a> {
     build: Build<'a>,
 }
 
-/// A table that was built and judged.
+/// A table that was built, and its errors.
 struct Row {
     name: &'static str,
     construction: String,
@@ -117,7 +117,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     renderer.install(|| {
         let job = render::prepare(&options.request, given)?.of_mesh("tables")?;
         let points = job.tetrahedra.points(job.mesh.points());
-        let geometry = Geometry::unconnected(&points, &job.tetrahedra);
+        let geometry = TetMesh::unconnected(&points, &job.tetrahedra);
         let normal = [0, 1, 2, 3].map(|k| job.field.normal(k));
         if job.field.kind() != Kind::Scalar {
             anyhow::bail!("this compares tables of fields of one component; choose one with --component");
@@ -170,7 +170,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     })
 }
 
-/// Builds a table, several times if that is quick, and judges it.
+/// Builds a table, several times if that is quick, and measures its errors.
 fn row(form: Form<'_>, truth: &[([f64; 3], [f64; 4])]) -> Result<Option<Row>> {
     let (mut times, begun) = (vec![], Instant::now());
     let mut last;
@@ -312,7 +312,7 @@ fn truth(exact: &Exact<f64>, front: f64, back: f64, l: f64) -> [f64; 4] {
     let mut light = Light::none();
     exact.add(&[front], &[back], l, &mut light);
     let [r, g, b] = light.color;
-    [r, g, b, 1.0 - light.through]
+    [r, g, b, 1.0 - light.transmittance]
 }
 
 /// Values in front and behind and lengths of segments along three additive sequences (Roberts 2018).

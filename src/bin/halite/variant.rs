@@ -1,8 +1,8 @@
-//! The switches of the projection engine, as options and in scenes.
+//! The options of the projection engine, as options and in scenes.
 
 use anyhow::{Result, anyhow};
 use clap::Args;
-use halite::project::{Compositing, Cycles, Fragments, Order, Switches, Target, Thickness};
+use halite::project::{Compositing, Cycles, Fragments, Order, ProjectionOptions, Target, Thickness};
 use halite::scene::{Scene, read};
 use serde::de::DeserializeOwned;
 use std::path::Path;
@@ -36,16 +36,16 @@ pub(crate) struct Variant {
 }
 
 impl Variant {
-    /// `switches`, with what was said in their place.
-    pub(crate) fn apply(&self, switches: Switches) -> Switches {
-        Switches {
-            fragments: self.fragments.unwrap_or(switches.fragments),
-            thickness: self.thickness.unwrap_or(switches.thickness),
-            order: self.order.unwrap_or(switches.order),
-            cycles: self.cycles.unwrap_or(switches.cycles),
-            target: self.target.unwrap_or(switches.target),
-            dither: self.dither.unwrap_or(switches.dither),
-            compositing: self.compositing.unwrap_or(switches.compositing),
+    /// `projection`, with what was said in its place.
+    pub(crate) fn apply(&self, projection: ProjectionOptions) -> ProjectionOptions {
+        ProjectionOptions {
+            fragments: self.fragments.unwrap_or(projection.fragments),
+            thickness: self.thickness.unwrap_or(projection.thickness),
+            order: self.order.unwrap_or(projection.order),
+            cycles: self.cycles.unwrap_or(projection.cycles),
+            target: self.target.unwrap_or(projection.target),
+            dither: self.dither.unwrap_or(projection.dither),
+            compositing: self.compositing.unwrap_or(projection.compositing),
         }
     }
 
@@ -64,9 +64,9 @@ impl Variant {
     }
 }
 
-/// The switches of a scene's "projection".
-pub(crate) fn of_scene(scene: &Scene, path: &Path) -> Result<Switches> {
-    let Some(value) = &scene.projection else { return Ok(Switches::default()) };
+/// The options of the projection engine that a scene's "projection" says.
+pub(crate) fn of_scene(scene: &Scene, path: &Path) -> Result<ProjectionOptions> {
+    let Some(value) = &scene.projection else { return Ok(ProjectionOptions::default()) };
     read(value).map_err(|what| anyhow!("{}: projection: {what}", path.display()))
 }
 

@@ -76,7 +76,7 @@ pub(super) fn exactly(scene: &Scene, value: &Cubic, length: f32) -> [f32; 4] {
     let shows = |i: usize| scene.visible.shows([i, i]);
     scene.frame.exact.add_cubic(value, f64::from(length), shows, &mut light);
     let [r, g, b] = light.color;
-    [r, g, b, 1.0 - light.through].map(|v| v as f32)
+    [r, g, b, 1.0 - light.transmittance].map(|v| v as f32)
 }
 
 impl Cut {

@@ -1,6 +1,6 @@
 //! The transfer function as lanes read it: lines in f32, over values that are counted in the spread of its knots.
 
-use crate::field::Normal;
+use crate::field::Normalization;
 use crate::integral::{Exact, OPAQUE_EXTINCTION};
 
 /// A line narrower than this, in half the spread of the knots, or steeper, in the greatest values per that, leaves f32 too
@@ -65,7 +65,7 @@ pub(super) struct Lines {
 impl Lines {
     /// Those of a scalar's function over values that `normal` maps; their map is in f32's reach, if the values are
     /// `exact_in_f32`. Nothing if f32 cannot hold the function.
-    pub(super) fn new(exact: &Exact<f64>, normal: Normal, exact_in_f32: bool) -> Option<Self> {
+    pub(super) fn new(exact: &Exact<f64>, normal: Normalization, exact_in_f32: bool) -> Option<Self> {
         let (knots, curved) = exact.curved.as_ref().map_or((&exact.opacity, None), |c| (&c.knots, Some(c.unit)));
         let n = knots.s.len();
         // The outer knots lie beyond every value.

@@ -3,10 +3,10 @@
 use super::*;
 use crate::field;
 use crate::gpu::raster::{self, Readback};
-use crate::gpu::shader::{self, Variant};
+use crate::gpu::shader::{self, ShaderVariant};
 use crate::gpu::testing::{gpu, validated};
-use crate::integral::choice::{Choice, Form};
 use crate::integral::lookup::tests::{choices, exact, segments, transfer, worst};
+use crate::integral::options::{Form, IntegrationOptions};
 use crate::transfer::Emission;
 use wgpu::naga;
 
@@ -21,21 +21,21 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     outcomes[id.x] = looked_up(c.x, c.y, c.z);
 }";
 
-fn source(table: &Lookup, direct: bool) -> String {
-    let variant = Variant { kind: field::Kind::Scalar, direct };
+fn source(table: &PreintegratedTable, direct: bool) -> String {
+    let variant = ShaderVariant { kind: field::Kind::Scalar, direct };
     let constants = constants(Some(table), false) + &declarations(2, 0);
     [&shader::prelude(&variant), &constants, shader::INTEGRAL, TABLE, MAIN].join("\n")
 }
 
 /// What the device looks up.
-fn looked_up(gpu: &Gpu, table: &Lookup, direct: bool, segments: &[[f32; 3]]) -> Vec<[f32; 4]> {
+fn looked_up(gpu: &Gpu, table: &PreintegratedTable, direct: bool, segments: &[[f32; 3]]) -> Vec<[f32; 4]> {
     let on_device = OnDevice::holding(gpu, table).unwrap();
     looked_up_in(gpu, (table, &on_device), direct, segments)
 }
 
 fn looked_up_in(
     gpu: &Gpu,
-    (table, on_device): (&Lookup, &OnDevice),
+    (table, on_device): (&PreintegratedTable, &OnDevice),
     direct: bool,
     segments: &[[f32; 3]],
 ) -> Vec<[f32; 4]> {
@@ -65,7 +65,7 @@ fn looked_up_in(
 
 #[test]
 fn layouts_match_their_rust_twins() {
-    let table = Lookup::new(&exact(Emission::Chromatic), &choices()[0], 2.0).unwrap();
+    let table = PreintegratedTable::new(&exact(Emission::Chromatic), &choices()[0], 2.0).unwrap();
     let module = validated(&source(&table, false));
     let (_, t) = module.types.iter().find(|(_, t)| t.name.as_deref() == Some("Table")).unwrap();
     let naga::TypeInner::Struct { span, members } = &t.inner else { panic!("no struct") };
@@ -83,13 +83,13 @@ fn devices_look_up_as_f64_does() {
                 if texel_format(&gpu, texels).is_err() || choice.planes == Planes::One {
                     continue;
                 }
-                let choice = Choice { texels, ..choice };
-                let table = Lookup::new(&exact(emission), &choice, 2.0).unwrap();
+                let choice = IntegrationOptions { texels, ..choice };
+                let table = PreintegratedTable::new(&exact(emission), &choice, 2.0).unwrap();
                 let got = looked_up(&gpu, &table, emission != Emission::Chromatic, &segments);
                 let worst = worst(&table, &segments, &got);
                 // Filters of real devices round their weights to 8 bits; llvmpipe's of 8-bit texels round what they
                 // mix, too.
-                let bound = match (gpu.adapter.kind == "CPU", texels) {
+                let bound = match (gpu.adapter.is_software(), texels) {
                     (_, Texels::Unorm8) => 5e-2,
                     (true, _) => 2e-5,
                     (false, _) => 5e-3,
@@ -113,18 +113,18 @@ fn devices_look_up_what_they_built() {
         let narrow = Exact::<f32>::new(
             &transfer(emission),
             field::Kind::Scalar,
-            &[field::Normal { mid: 0.0, half: 1.0 }; 4],
+            &[field::Normalization { mid: 0.0, half: 1.0 }; 4],
             1.0,
         );
         let function = crate::gpu::function::upload(&gpu, &narrow).unwrap();
-        let builder = Builder::new(&gpu, direct).unwrap();
-        let volumes = [Kind::Uniform, Kind::Log, Kind::LogNormalised].map(|lengths| Choice {
+        let builder = TableBuilder::new(&gpu, direct).unwrap();
+        let volumes = [Kind::Uniform, Kind::Log, Kind::LogNormalised].map(|lengths| IntegrationOptions {
             lengths,
             table: Some([17, 17, 8]),
-            ..Choice::of(Form::Volume)
+            ..IntegrationOptions::of(Form::Volume)
         });
         for choice in choices().into_iter().filter(|c| c.planes == Planes::Two).chain(volumes) {
-            let table = Lookup::outline(&exact, &choice, 2.0).unwrap();
+            let table = PreintegratedTable::outline(&exact, &choice, 2.0).unwrap();
             let on_device = OnDevice::building(&gpu, &table, &exact, &builder, &function);
             let [front, back, _] = table.size();
             if front != back || choice.degree > 4 {
@@ -132,8 +132,8 @@ fn devices_look_up_what_they_built() {
                 continue;
             }
             let got = looked_up_in(&gpu, (&table, &on_device.unwrap()), direct, &segments);
-            let worst = worst(&Lookup::new(&exact, &choice, 2.0).unwrap(), &segments, &got);
-            let bound = if gpu.adapter.kind == "CPU" { 1e-4 } else { 5e-3 };
+            let worst = worst(&PreintegratedTable::new(&exact, &choice, 2.0).unwrap(), &segments, &got);
+            let bound = if gpu.adapter.is_software() { 1e-4 } else { 5e-3 };
             assert!(worst < bound, "{choice:?}, {emission:?}: {worst}");
             built += 1;
         }
@@ -144,11 +144,15 @@ fn devices_look_up_what_they_built() {
 #[test]
 fn one_plane_is_read_as_on_the_host() {
     let Some(gpu) = gpu() else { return };
-    let choice = Choice { planes: Planes::One, table: Some([15, 15, 24]), ..Choice::of(Form::Cylindrical) };
+    let choice = IntegrationOptions {
+        planes: Planes::One,
+        table: Some([15, 15, 24]),
+        ..IntegrationOptions::of(Form::Cylindrical)
+    };
     if texel_format(&gpu, choice.texels).is_err() {
         return;
     }
-    let table = Lookup::new(&exact(Emission::Chromatic), &choice, 2.0).unwrap();
+    let table = PreintegratedTable::new(&exact(Emission::Chromatic), &choice, 2.0).unwrap();
     let segments = segments(5000);
     let got = looked_up(&gpu, &table, false, &segments);
     let off = segments.iter().zip(&got).filter(|(s, got)| {

@@ -7,7 +7,7 @@
 //! from the front, until nothing behind can be seen.
 
 use super::Cubic;
-use crate::integral::{DEEP, GAUSS_6};
+use crate::integral::{GAUSS_6, OPAQUE_DEPTH};
 
 /// Nodes in [0, 1] and weights of the 4-point Gauss–Legendre rule.
 const GAUSS_4: [[f64; 2]; 4] = [
@@ -76,7 +76,7 @@ impl<const M: usize> Piece<M> {
                 Piece { depth: Cubic(depth.0.map(|d| d * 0.5)), emission }
             };
             part(0.0, 0.5).halve(direct, halvings - 1, share * 0.5, through, whole);
-            if *through > (-DEEP).exp() {
+            if *through > (-OPAQUE_DEPTH).exp() {
                 part(0.5, 1.0).halve(direct, halvings - 1, share * 0.5, through, whole);
             }
             return;

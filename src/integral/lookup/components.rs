@@ -3,11 +3,11 @@
 //! The table knows the weights of the colours at a segment's two ends ([`Exact::weights`]), between which colours are linear. So they are
 //! along a segment of an RGBA field; of a pair, the segment is cut where its first component crosses a knot of the function of colour.
 
-use super::{Lookup, WITHIN};
+use super::{PreintegratedTable, WITHIN};
 use crate::integral::knots::Track;
 use crate::integral::{Exact, Light, Piece};
 
-impl Lookup {
+impl PreintegratedTable {
     /// Adds a segment of `length` to `light`. Values that are not finite make it invisible. Where the component that opacity is of is
     /// beyond ±1 the function is constant: that part of a segment is integrated exactly. `N` is the number of the field's components,
     /// those that the table was built for.

@@ -1,10 +1,10 @@
 #![allow(clippy::unwrap_used, clippy::print_stderr, reason = "tests")]
 
 use super::*;
-use crate::field::Normal;
+use crate::field::Normalization;
 use crate::transfer::{Convention, Emission, TransferFunction};
 
-const UNIT: [Normal; 4] = [Normal { mid: 0.0, half: 1.0 }; 4];
+const UNIT: [Normalization; 4] = [Normalization { mid: 0.0, half: 1.0 }; 4];
 
 /// Ramps and a peak.
 pub(crate) fn transfer(emission: Emission) -> TransferFunction {
@@ -21,28 +21,34 @@ pub(crate) fn exact(emission: Emission) -> Exact<f64> {
 #[test]
 fn tables_are_renewed() {
     let [one, other] = [Emission::Chromatic, Emission::Direct { scale: 0.7 }].map(exact);
-    for choice in choices() {
+    for options in choices() {
         for texels in [Texels::Float, Texels::Unorm8] {
-            let choice = Choice { texels, ..choice };
+            let options = IntegrationOptions { texels, ..options };
             for longest in [2.0, 1.5] {
-                let (old, want) = (Lookup::new(&one, &choice, 2.0).unwrap(), Lookup::new(&other, &choice, longest));
-                assert!(Lookup::renewed(old, &other, &choice, longest).unwrap() == want.unwrap(), "{choice:?}");
+                let (old, want) = (
+                    PreintegratedTable::new(&one, &options, 2.0).unwrap(),
+                    PreintegratedTable::new(&other, &options, longest),
+                );
+                assert!(
+                    PreintegratedTable::renewed(old, &other, &options, longest).unwrap() == want.unwrap(),
+                    "{options:?}"
+                );
             }
         }
     }
 }
 
 /// Every form and variant, small.
-pub(crate) fn choices() -> Vec<Choice> {
+pub(crate) fn choices() -> Vec<IntegrationOptions> {
     let mut all = vec![];
     for lengths in [Kind::Uniform, Kind::Log, Kind::LogNormalised] {
-        all.push(Choice { lengths, table: Some([17, 9, 8]), ..Choice::of(Form::Volume) });
+        all.push(IntegrationOptions { lengths, table: Some([17, 9, 8]), ..IntegrationOptions::of(Form::Volume) });
     }
     for degree in [1, 2, 4, 7] {
-        all.push(Choice { degree, table: Some([33, 33, 0]), ..Choice::of(Form::Polynomial) });
+        all.push(IntegrationOptions { degree, table: Some([33, 33, 0]), ..IntegrationOptions::of(Form::Polynomial) });
     }
     for planes in [Planes::Two, Planes::Packed, Planes::One] {
-        all.push(Choice { planes, table: Some([15, 15, 24]), ..Choice::of(Form::Cylindrical) });
+        all.push(IntegrationOptions { planes, table: Some([15, 15, 24]), ..IntegrationOptions::of(Form::Cylindrical) });
     }
     all
 }
@@ -68,21 +74,21 @@ pub(crate) fn segments(n: usize) -> Vec<[f32; 3]> {
 }
 
 /// What f64 finds in the same table.
-pub(crate) fn judged(table: &Lookup, [front, back, l]: [f32; 3]) -> [f64; 4] {
+pub(crate) fn exact_light(table: &PreintegratedTable, [front, back, l]: [f32; 3]) -> [f64; 4] {
     let [front, back, l] = [front, back, l].map(f64::from);
     match table.stored() {
-        Stored::Volume(t) => t.look_up(front, back, l),
-        Stored::Polynomial(t) => t.look_up(front, back, l),
-        Stored::Cylindrical(t) => t.look_up(front, back, l),
-        Stored::SecondOrder(t) => t.look_up([front, (front + back) / 2.0, back]),
-        Stored::SecondOrderPolynomial(t) => t.look_up([front, (front + back) / 2.0, back], l),
+        TableData::Volume(t) => t.look_up(front, back, l),
+        TableData::Polynomial(t) => t.look_up(front, back, l),
+        TableData::Cylindrical(t) => t.look_up(front, back, l),
+        TableData::SecondOrder(t) => t.look_up([front, (front + back) / 2.0, back]),
+        TableData::SecondOrderPolynomial(t) => t.look_up([front, (front + back) / 2.0, back], l),
     }
 }
 
 /// The greatest of the errors of `got` against f64's look-ups, over emission where that is direct and so has no bound.
-pub(crate) fn worst(table: &Lookup, segments: &[[f32; 3]], got: &[[f32; 4]]) -> f64 {
+pub(crate) fn worst(table: &PreintegratedTable, segments: &[[f32; 3]], got: &[[f32; 4]]) -> f64 {
     let errors = segments.iter().zip(got).map(|(s, got)| {
-        let want = judged(table, *s);
+        let want = exact_light(table, *s);
         (0..4).map(|k| (f64::from(got[k]) - want[k]).abs()).fold(0.0, f64::max)
     });
     errors.fold(0.0, f64::max)
@@ -92,14 +98,14 @@ pub(crate) fn worst(table: &Lookup, segments: &[[f32; 3]], got: &[[f32; 4]]) -> 
 fn look_ups_are_those_of_f64() {
     let segments = segments(20_000);
     for emission in [Emission::Chromatic, Emission::Direct { scale: 0.7 }] {
-        for choice in choices() {
-            if choice.planes == Planes::One {
+        for options in choices() {
+            if options.planes == Planes::One {
                 continue;
             }
-            let table = Lookup::new(&exact(emission), &choice, 2.0).unwrap();
+            let table = PreintegratedTable::new(&exact(emission), &options, 2.0).unwrap();
             let got: Vec<_> = segments.iter().map(|&[f, b, l]| table.look_up(f, b, l)).collect();
             let worst = worst(&table, &segments, &got);
-            assert!(worst < 4e-6, "{choice:?}, {emission:?}: {worst}");
+            assert!(worst < 4e-6, "{options:?}, {emission:?}: {worst}");
         }
     }
 }
@@ -108,8 +114,9 @@ fn look_ups_are_those_of_f64() {
 fn one_plane_is_the_nearer_of_two() {
     let exact = exact(Emission::Chromatic);
     let of = |planes| {
-        let choice = Choice { planes, table: Some([15, 15, 24]), ..Choice::of(Form::Cylindrical) };
-        Lookup::new(&exact, &choice, 2.0).unwrap()
+        let options =
+            IntegrationOptions { planes, table: Some([15, 15, 24]), ..IntegrationOptions::of(Form::Cylindrical) };
+        PreintegratedTable::new(&exact, &options, 2.0).unwrap()
     };
     let (one, two) = (of(Planes::One), of(Planes::Two));
     // On a plane both read the same: a = k / 24, at the border of the first part and in it.
@@ -117,7 +124,7 @@ fn one_plane_is_the_nearer_of_two() {
         let [a, b] = [&one, &two].map(|t| t.look_up(front, back, l));
         assert!((0..4).all(|k| (a[k] - b[k]).abs() < 1e-5), "{a:?}, {b:?}");
     }
-    let between = |t: &Lookup| t.look_up(0.5, 0.0, 0.57);
+    let between = |t: &PreintegratedTable| t.look_up(0.5, 0.0, 0.57);
     assert!((between(&one)[3] - between(&two)[3]).abs() > 1e-5);
 }
 
@@ -125,17 +132,17 @@ fn one_plane_is_the_nearer_of_two() {
 fn fewer_bits_round_texels() {
     let exact = exact(Emission::Chromatic);
     let segments = segments(2000);
-    for choice in choices() {
+    for options in choices() {
         let error = |texels| {
-            let table = Lookup::new(&exact, &Choice { texels, ..choice }, 2.0).unwrap();
-            let fine = Lookup::new(&exact, &choice, 2.0).unwrap();
+            let table = PreintegratedTable::new(&exact, &IntegrationOptions { texels, ..options }, 2.0).unwrap();
+            let fine = PreintegratedTable::new(&exact, &options, 2.0).unwrap();
             let got: Vec<_> = segments.iter().map(|&[f, b, l]| table.look_up(f, b, l)).collect();
             let want: Vec<_> = segments.iter().map(|&[f, b, l]| fine.look_up(f, b, l)).collect();
             let error = |(a, b): (&[f32; 4], &[f32; 4])| (0..4).map(|k| (a[k] - b[k]).abs()).fold(0.0, f32::max);
             got.iter().zip(&want).map(error).fold(0.0, f32::max)
         };
         let [eight, sixteen] = [Texels::Unorm8, Texels::Unorm16].map(error);
-        assert!(eight > 20.0 * sixteen && sixteen > 0.0 && eight < 0.2, "{choice:?}: {eight}, {sixteen}");
+        assert!(eight > 20.0 * sixteen && sixteen > 0.0 && eight < 0.2, "{options:?}: {eight}, {sixteen}");
     }
 }
 
@@ -148,9 +155,9 @@ fn an_opaque_stretch_leaves_levels_to_the_rest() {
     let exact = Exact::<f64>::new(&transfer, field::Kind::Scalar, &UNIT, 1.0);
     let segments: Vec<_> = segments(20_000).into_iter().filter(|s| s[2] > 0.05).collect();
     for form in [Form::Volume, Form::Polynomial, Form::Cylindrical] {
-        let choice = Choice { table: Some([128, 128, 16]), ..Choice::of(form) };
+        let options = IntegrationOptions { table: Some([128, 128, 16]), ..IntegrationOptions::of(form) };
         let [float, sixteen, eight] = [Texels::Float, Texels::Unorm16, Texels::Unorm8].map(|texels| {
-            let table = Lookup::new(&exact, &Choice { texels, ..choice }, 2.0).unwrap();
+            let table = PreintegratedTable::new(&exact, &IntegrationOptions { texels, ..options }, 2.0).unwrap();
             segments.iter().map(|&[f, b, l]| table.look_up(f, b, l)).collect::<Vec<_>>()
         });
         let rmse = |a: &[[f32; 4]]| {
@@ -167,8 +174,9 @@ fn an_opaque_stretch_leaves_levels_to_the_rest() {
 fn linear_opacity_meets_the_exponential_at_the_ends() {
     let exact = exact(Emission::Chromatic);
     let of = |opacity| {
-        let choice = Choice { alpha: opacity, table: Some([33, 33, 0]), ..Choice::of(Form::Polynomial) };
-        Lookup::new(&exact, &choice, 2.0).unwrap()
+        let options =
+            IntegrationOptions { alpha: opacity, table: Some([33, 33, 0]), ..IntegrationOptions::of(Form::Polynomial) };
+        PreintegratedTable::new(&exact, &options, 2.0).unwrap()
     };
     let alpha = |opacity, l| of(opacity).look_up(0.3, 0.1, l)[3];
     for l in [0.0, 2.0] {
@@ -183,23 +191,31 @@ fn limits_are_finite() {
     let opacity = vec![(-1.0, 0.0), (0.0, 0.0), (0.0, 1e20), (0.01, 1e20), (0.01, 0.0)];
     let transfer = TransferFunction::new(color, opacity, 1.0).unwrap();
     let exact = Exact::<f64>::new(&transfer, field::Kind::Scalar, &UNIT, 1.0);
-    for choice in choices() {
+    for options in choices() {
         for texels in [Texels::Float, Texels::Unorm8] {
-            let table = Lookup::new(&exact, &Choice { texels, ..choice }, 2.0).unwrap();
+            let table = PreintegratedTable::new(&exact, &IntegrationOptions { texels, ..options }, 2.0).unwrap();
             for [f, b, l] in segments(500).into_iter().chain([[2.0, -2.0, 5.0], [0.005, 0.005, 1e-30]]) {
                 let c = table.look_up(f, b, l);
-                assert!(c.iter().all(|v| v.is_finite()) && c[3] >= 0.0 && c[3] <= 1.0, "{choice:?} {f} {b} {l}: {c:?}");
+                assert!(
+                    c.iter().all(|v| v.is_finite()) && c[3] >= 0.0 && c[3] <= 1.0,
+                    "{options:?} {f} {b} {l}: {c:?}"
+                );
             }
         }
     }
     let pair = Exact::<f64>::new(&transfer, field::Kind::Pair, &UNIT, 1.0);
-    let refused = Lookup::new(&pair, &Choice::of(Form::SecondOrder), 1.0).unwrap_err().to_string();
+    let refused =
+        PreintegratedTable::new(&pair, &IntegrationOptions::of(Form::SecondOrder), 1.0).unwrap_err().to_string();
     assert!(refused.contains("one component"), "{refused}");
 }
 
 /// What a segment of a field of several components does by a table, against the exact integral of f64.
-fn worst_of_components<const N: usize>(exact: &Exact<f64>, narrow: &Exact<f32>, choice: &Choice) -> [f64; 2] {
-    let table = Lookup::new(exact, choice, 2.0).unwrap();
+fn worst_of_components<const N: usize>(
+    exact: &Exact<f64>,
+    narrow: &Exact<f32>,
+    options: &IntegrationOptions,
+) -> [f64; 2] {
+    let table = PreintegratedTable::new(exact, options, 2.0).unwrap();
     let (mut colours, mut opacities) = (0.0f64, 0.0f64);
     let all = segments(4000);
     for (i, [s, t, l]) in all.iter().copied().enumerate() {
@@ -216,7 +232,7 @@ fn worst_of_components<const N: usize>(exact: &Exact<f64>, narrow: &Exact<f32>, 
         for k in 0..3 {
             colours = colours.max((f64::from(got.color[k]) - want.color[k]).abs());
         }
-        opacities = opacities.max((f64::from(got.through) - want.through).abs());
+        opacities = opacities.max((f64::from(got.transmittance) - want.transmittance).abs());
     }
     [colours, opacities]
 }
@@ -239,15 +255,15 @@ fn weights_stand_for_colours_of_their_own() {
             (Form::Cylindrical, [33, 33, 32], [129, 129, 128]),
         ] {
             let errors = [small, large].map(|size| {
-                let choice = Choice { table: Some(size), degree: 3, ..Choice::of(form) };
-                let bound = match Lookup::new(&pair.0, &choice, 2.0).unwrap().stored() {
-                    Stored::Volume(t) => t.bound(&weights),
-                    Stored::Polynomial(t) => t.bound(&weights),
+                let options = IntegrationOptions { table: Some(size), degree: 3, ..IntegrationOptions::of(form) };
+                let bound = match PreintegratedTable::new(&pair.0, &options, 2.0).unwrap().stored() {
+                    TableData::Volume(t) => t.bound(&weights),
+                    TableData::Polynomial(t) => t.bound(&weights),
                     _ => None,
                 };
                 let [pairs, colours] = [
-                    worst_of_components::<2>(&pair.0, &pair.1, &choice),
-                    worst_of_components::<4>(&rgba.0, &rgba.1, &choice),
+                    worst_of_components::<2>(&pair.0, &pair.1, &options),
+                    worst_of_components::<4>(&rgba.0, &rgba.1, &options),
                 ];
                 eprintln!("{form:?}, {size:?}, {emission:?}: pairs {pairs:?}, RGBA {colours:?}, bound {bound:?}");
                 if let Some(bound) = bound {
@@ -271,7 +287,7 @@ fn small_cells_beside_huge_ones_keep_their_extinction() {
     let transfer = TransferFunction::new(vec![(0.0, [0.2, 0.5, 1.0])], vec![(-1.0, 500.0), (1.0, 900.0)], 1.0).unwrap();
     let exact = Exact::<f64>::new(&transfer, field::Kind::Scalar, &UNIT, 1.0);
     for form in [Form::Volume, Form::Polynomial] {
-        let table = Lookup::new(&exact, &Choice::of(form), 2.0).unwrap();
+        let table = PreintegratedTable::new(&exact, &IntegrationOptions::of(form), 2.0).unwrap();
         for l in [2e-4, 2e-3, 1e-2] {
             let [.., blue, alpha] = table.look_up(0.0, 0.0, l);
             let want = -(-700.0 * f64::from(l)).exp_m1();

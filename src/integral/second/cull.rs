@@ -220,15 +220,15 @@ impl Second {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field::Normal;
-    use crate::integral::choice::Two;
+    use crate::field::Normalization;
+    use crate::integral::options::Two;
     use crate::reference::segment_of_two;
     use crate::transfer::bivariate::{OPEN, Widget};
     use crate::transfer::{Bivariate, TransferFunction};
     use glam::DVec3;
 
     fn second(transfer: &TransferFunction) -> Second {
-        Second::new(transfer, [Normal { mid: 0.0, half: 1.0 }; 2], DVec3::ZERO, 1.0, Two::default())
+        Second::new(transfer, [Normalization { mid: 0.0, half: 1.0 }; 2], DVec3::ZERO, 1.0, Two::default())
     }
 
     fn functions() -> Vec<(&'static str, TransferFunction)> {

@@ -64,7 +64,7 @@ impl Seen {
         let (depth, change) = (0.5 * (x + y), 0.5 * (y - x));
         let root = change.abs().sqrt();
         let share = if depth.max(root) < MILD {
-            let piece = Piece::mild(x, y, true);
+            let piece = Piece::by_series(x, y, true);
             piece.front + piece.back
         } else if depth * 1e-8 > change.abs() {
             return Seen::uniform(depth, length);

@@ -172,7 +172,7 @@ impl Second {
     #[inline(always)]
     pub(super) fn smooth(&self, segment: &Segment, ends: [f64; 2], scratch: &mut Scratch, light: &mut Gathered<f64>) {
         let mut u = ends[0];
-        while u < ends[1] && light.through > DARK {
+        while u < ends[1] && light.transmittance > DARK {
             let next = self.next(segment, &scratch.active, u).min(ends[1]);
             let piece = self.piece(segment, [u, next], &scratch.active);
             if self.direct.is_some() || !piece.clear {
@@ -255,7 +255,7 @@ impl Second {
         }
         let longest = (end - begin) / bend.ceil().max(1.0);
         let (mut u, mut h, mut count) = (begin, longest, 0);
-        while u < end && light.through > DARK {
+        while u < end && light.transmittance > DARK {
             let left = end - u;
             // No sliver is left to the last.
             h = if left < h * (1.0 + SAME) {

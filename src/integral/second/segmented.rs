@@ -7,7 +7,7 @@ use super::lanes::{each, opacity};
 use super::nodes::Nodes;
 use super::{Gathered, Scratch, Second, Segment};
 use crate::integral::Piece;
-use crate::integral::choice::{Two, Weights};
+use crate::integral::options::{Two, Weights};
 
 /// Texels of the table along each axis.
 const SIZE: usize = 256;

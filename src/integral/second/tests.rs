@@ -1,7 +1,7 @@
 //! Segments against the reference's.
 
 use super::*;
-use crate::integral::choice::Weights;
+use crate::integral::options::Weights;
 use crate::reference::segment_of_two;
 use crate::transfer::bivariate::{OPEN, Sine, Wave};
 use rayon::prelude::*;
@@ -29,7 +29,7 @@ fn segment(front: [f64; 2], back: [f64; 2], length: f64) -> Segment {
 }
 
 fn prepared(transfer: &TransferFunction, two: Two) -> Second {
-    Second::new(transfer, [Normal { mid: 0.0, half: 1.0 }; 2], DVec3::ZERO, 1.0, two)
+    Second::new(transfer, [Normalization { mid: 0.0, half: 1.0 }; 2], DVec3::ZERO, 1.0, two)
 }
 
 /// As [`segment_of_two`], by what engines do, and in how many panels.
@@ -37,7 +37,7 @@ fn counted(transfer: &TransferFunction, method: Method, segment: &Segment) -> ([
     let (mut light, mut scratch) = (Gathered::<f32>::none(), Scratch::default());
     prepared(transfer, Two { method, ..Two::default() }).add(segment, &mut scratch, &mut light);
     let [r, g, b] = light.color.map(f64::from);
-    ([r, g, b, 1.0 - f64::from(light.through)], scratch.panels)
+    ([r, g, b, 1.0 - f64::from(light.transmittance)], scratch.panels)
 }
 
 fn added(transfer: &TransferFunction, front: [f64; 2], back: [f64; 2], length: f64) -> [f64; 4] {
@@ -320,7 +320,7 @@ fn segmented_pieces_converge() {
             second.add(&segment(front, back, length), &mut scratch, &mut light);
             assert_eq!(scratch.panels, u64::from(pieces));
             let [r, g, b] = light.color.map(f64::from);
-            let got = [r, g, b, 1.0 - f64::from(light.through)];
+            let got = [r, g, b, 1.0 - f64::from(light.transmittance)];
             (0..4).map(|c| (got[c] - wanted[c]).abs()).fold(0.0, f64::max)
         };
         let [few, more, many] = [5, 10, 40].map(|n| error(n, Weights::Closed));

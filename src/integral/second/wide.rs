@@ -19,11 +19,11 @@ use super::closed::{Profile, Turn};
 use super::light::{ANGLES, angle};
 use super::panel::STEP;
 use super::{Bounded, Ready, Second};
-use crate::field::Normal;
+use crate::field::Normalization;
 use crate::integral::Knots;
-use crate::integral::choice::Method;
 use crate::integral::floats::{Floats, LANES, erf, exp, opacity};
 use crate::integral::knots::{Side, compile, sample};
+use crate::integral::options::Method;
 use crate::transfer::Convention;
 use crate::transfer::bivariate::{Shape, Table};
 use crate::transfer::shading::{Origin, Shading};
@@ -171,12 +171,12 @@ struct Taken<S: Simd> {
 }
 
 /// An interval of values as they are handed over, never narrower.
-fn handed_over([lo, hi]: [f64; 2], normal: Normal) -> [f32; 2] {
+fn handed_over([lo, hi]: [f64; 2], normal: Normalization) -> [f32; 2] {
     [(normal.apply(lo) as f32).next_down(), (normal.apply(hi) as f32).next_up()]
 }
 
 impl Widget {
-    fn new(bounded: &Bounded, normal: [Normal; 2]) -> Self {
+    fn new(bounded: &Bounded, normal: [Normalization; 2]) -> Self {
         let Bounded { widget, support, wave, .. } = bounded;
         let form = match (&widget.shape, wave) {
             (Shape::Gaussian { center, sigma }, _) => Form::Gaussian {
@@ -205,7 +205,7 @@ impl Widget {
 }
 
 impl Texels {
-    fn new(table: &Table, normal: [Normal; 2]) -> Self {
+    fn new(table: &Table, normal: [Normalization; 2]) -> Self {
         let place = |at: [f64; 2]| table.place(at);
         let (middle, end) = (place(normal.map(|n| n.mid)), place(normal.map(|n| n.mid + n.half)));
         Texels {

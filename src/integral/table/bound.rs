@@ -71,7 +71,7 @@ mod function;
 use super::volume::{Kind, length};
 use super::{is_scalar, is_tabulated};
 use crate::integral::Exact;
-use cell::Cell;
+use cell::TexelCell;
 use std::f64::consts::{E, LN_2};
 
 /// Errors of rounding texels to f32 and of what builds them, relative to the greatest colour.
@@ -102,13 +102,13 @@ fn chord(x: f64) -> f64 {
 }
 
 /// The greatest of `error` over the cells of a table of `values`², as far as one is beyond `limit`.
-fn worst(exact: &Exact<f64>, values: u32, limit: f64, error: impl Fn(&Cell) -> f64) -> f64 {
+fn worst(exact: &Exact<f64>, values: u32, limit: f64, error: impl Fn(&TexelCell) -> f64) -> f64 {
     let n = values as usize - 1;
     let intervals = function::intervals(&exact.opacity, n);
     let mut sums = vec![0.0];
     intervals.iter().for_each(|k| sums.push(sums[sums.len() - 1] + k.rise));
     let mut greatest = 0.0f64;
-    let of = |cell: Cell| if is_scalar(exact) { cell } else { cell.of_weights() };
+    let of = |cell: TexelCell| if is_scalar(exact) { cell } else { cell.of_weights() };
     for i in 0..n {
         greatest = cell::row(&intervals, &sums, i).fold(greatest, |m, cell| m.max(error(&of(cell))));
         if greatest > limit {
@@ -203,7 +203,7 @@ fn fewest(most: u32, error: f64, bound: impl Fn(u32) -> Option<f64>) -> Option<u
 
 /// The bound of premultiplied tables along the values, as far as it is beyond `limit`.
 fn along_values(exact: &Exact<f64>, values: u32, longest: f64, limit: f64) -> Option<f64> {
-    let error = |cell: &Cell| if exact.direct { cell.emitted(longest) } else { cell.premultiplied(longest) };
+    let error = |cell: &TexelCell| if exact.direct { cell.emitted(longest) } else { cell.premultiplied(longest) };
     is_bounded(exact, values).then(|| worst(exact, values, limit, error))
 }
 

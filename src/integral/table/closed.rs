@@ -11,7 +11,7 @@
 //! it.
 
 use super::grid::{Grid, Part};
-use crate::integral::{GAUSS_6, MILD, PANEL, Piece};
+use crate::integral::{GAUSS_6, GAUSS_DEPTH, Piece, SERIES_DEPTH};
 use crate::real::Real;
 
 /// Premultiplied colour and opacity (or what stands for both) of segments of several lengths.
@@ -27,9 +27,9 @@ impl<const L: usize> Lanes<L> {
     fn over(&self, behind: &Self) -> Self {
         let mut sum = *self;
         for (sum, behind) in sum.0.iter_mut().zip(&behind.0) {
-            let through = 1.0 - sum[3];
+            let transmittance = 1.0 - sum[3];
             for k in 0..4 {
-                sum[k] += through * behind[k];
+                sum[k] += transmittance * behind[k];
             }
         }
         sum
@@ -122,17 +122,17 @@ impl Weights {
         falling: [[0.0; AT_ONCE]; 2],
     };
 
-    /// As [`Piece::new`], both ways, for depths up to [`MILD`]. This and the next take no decisions, so that they
+    /// As [`Piece::new`], both ways, for depths up to [`SERIES_DEPTH`]. This and the next take no decisions, so that they
     /// become vector instructions.
     #[inline(always)]
     fn expand<const DIRECT: bool>(&mut self) {
         for q in 0..AT_ONCE {
             let (x, y) = (self.x[q], self.y[q]);
-            self.set(q, Piece::mild(x, y, DIRECT), Piece::mild(y, x, DIRECT));
+            self.set(q, Piece::by_series(x, y, DIRECT), Piece::by_series(y, x, DIRECT));
         }
     }
 
-    /// The same for depths up to [`PANEL`], a node at a time.
+    /// The same for depths up to [`GAUSS_DEPTH`], a node at a time.
     #[inline(always)]
     fn integrate<const DIRECT: bool>(&mut self) {
         let Weights { x, y, alpha, rising: [rising_front, rising_back], falling: [falling_front, falling_back] } = self;
@@ -168,7 +168,7 @@ impl Weights {
         for q in 0..AT_ONCE {
             // Squares must be finite, however long a segment of what is opaque.
             let (x, y) = (self.x[q].min(1e18), self.y[q].min(1e18));
-            if x.max(y) > PANEL as f32 {
+            if x.max(y) > GAUSS_DEPTH as f32 {
                 self.set(q, Piece::new(x, y, direct), Piece::new(y, x, direct));
             }
         }
@@ -176,11 +176,11 @@ impl Weights {
 
     #[inline(always)]
     fn all<const DIRECT: bool>(&mut self, steepest: f32) {
-        match steepest <= MILD as f32 {
+        match steepest <= SERIES_DEPTH as f32 {
             true => self.expand::<DIRECT>(),
             false => self.integrate::<DIRECT>(),
         }
-        if steepest > PANEL as f32 {
+        if steepest > GAUSS_DEPTH as f32 {
             self.integrate_deep(DIRECT);
         }
     }

@@ -59,7 +59,7 @@ impl Cylindrical {
                 sum = if weights { joined(&slab, &sum, (l - length) / l, exact.direct) } else { behind(slab, &sum) };
                 (front, length) = (next, l);
                 let [r, g, b] = sum.color;
-                *texel = [r, g, b, 1.0 - sum.through].map(|c| c as f32);
+                *texel = [r, g, b, 1.0 - sum.transmittance].map(|c| c as f32);
             }
         };
         let mut texels = vec![[0.0; 4]; planes.checked_mul(size)?.checked_mul(size)? as usize];
@@ -92,17 +92,17 @@ impl Cylindrical {
 
 /// `slab` and what is behind it.
 fn behind(mut slab: Light<f64>, sum: &Light<f64>) -> Light<f64> {
-    slab.add(sum.color, 1.0 - sum.through);
+    slab.add(sum.color, 1.0 - sum.transmittance);
     slab
 }
 
 /// The weights of the colours at the ends of both together, the slab being the `share` of the length that is in front.
 fn joined(slab: &Light<f64>, sum: &Light<f64>, share: f64, direct: bool) -> Light<f64> {
     let share = if share.is_finite() { share } else { 0.0 };
-    let whole = |of: &Light<f64>| if direct { of.color[0] + of.color[1] } else { 1.0 - of.through };
-    let back = share * slab.color[0] + slab.through * (share * whole(sum) + (1.0 - share) * sum.color[0]);
-    let front = share * slab.color[1] + (1.0 - share) * (whole(slab) + slab.through * sum.color[1]);
-    Light { color: [back, front, 0.0], through: slab.through * sum.through }
+    let whole = |of: &Light<f64>| if direct { of.color[0] + of.color[1] } else { 1.0 - of.transmittance };
+    let back = share * slab.color[0] + slab.transmittance * (share * whole(sum) + (1.0 - share) * sum.color[0]);
+    let front = share * slab.color[1] + (1.0 - share) * (whole(slab) + slab.transmittance * sum.color[1]);
+    Light { color: [back, front, 0.0], transmittance: slab.transmittance * sum.transmittance }
 }
 
 /// Equation 9: (S_f, S_b, l) of (a, s, t).

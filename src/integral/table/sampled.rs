@@ -113,7 +113,7 @@ fn texel_of(list: &[[f32; 4]], [front, back]: [f32; 2], l: f32, count: u32, dire
     let (step, scale) = (l / count as f32, (list.len() - 1) as f32 / 2.0);
     let (mut at, rise) = ((front + 1.0) * scale, (back - front) * scale / count as f32);
     at += rise / 2.0;
-    let (mut sum, mut through) = ([0.0; 3], 1.0);
+    let (mut sum, mut transmittance) = ([0.0; 3], 1.0);
     for i in 0..count {
         let [r, g, b, tau] = entry(list, at + rise * i as f32);
         let alpha = opacity_of_depth(tau * step);
@@ -123,11 +123,11 @@ fn texel_of(list: &[[f32; 4]], [front, back]: [f32; 2], l: f32, count: u32, dire
             true => step,
         };
         for (sum, c) in sum.iter_mut().zip([r, g, b]) {
-            *sum += through * seen * c;
+            *sum += transmittance * seen * c;
         }
-        through *= 1.0 - alpha;
+        transmittance *= 1.0 - alpha;
     }
-    [sum[0], sum[1], sum[2], 1.0 - through]
+    [sum[0], sum[1], sum[2], 1.0 - transmittance]
 }
 
 /// One texel, from back to front, as a frame buffer of few bits blends it.

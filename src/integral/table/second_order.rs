@@ -99,7 +99,7 @@ pub fn parabola(exact: &Exact<f64>, samples: [f64; 3], length: f64) -> [f64; 4] 
     let mut light = Light::none();
     exact.add_cubic(&Cubic::parabola(samples), length, |_| true, &mut light);
     let [r, g, b] = light.color;
-    [r, g, b, 1.0 - light.through]
+    [r, g, b, 1.0 - light.transmittance]
 }
 
 /// What a linear filter makes of the texels around three samples.

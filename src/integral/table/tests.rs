@@ -4,14 +4,14 @@ mod weights;
 
 use super::cylindrical::{coordinates, place};
 use super::*;
-use crate::field::Normal;
+use crate::field::Normalization;
 use crate::transfer::{Convention, Emission, TransferFunction};
 use rayon::prelude::*;
 
 fn exact(opacity: &[(f64, f64)], emission: Emission) -> Exact<f64> {
     let color = vec![(-1.0, [1.0, 0.2, 0.0]), (0.3, [0.0, 0.5, 0.9]), (1.0, [0.4, 0.4, 0.4])];
     let transfer = TransferFunction::new(color, opacity.to_vec(), 1.0).unwrap().with_emission(emission).unwrap();
-    Exact::new(&transfer, field::Kind::Scalar, &[Normal { mid: 0.0, half: 1.0 }; 4], 1.0)
+    Exact::new(&transfer, field::Kind::Scalar, &[Normalization { mid: 0.0, half: 1.0 }; 4], 1.0)
 }
 
 #[test]
@@ -122,7 +122,7 @@ fn planes_stand_for_a_volume() {
     let opacity = (-128..=128).map(|i| (at(i), 1.0 + (2.0 * at(i)).sin())).collect();
     let color = (-128..=128).map(|i| (at(i), [0.5 + 0.5 * at(i), (1.5 * at(i)).cos(), 0.3])).collect();
     let transfer = TransferFunction::new(color, opacity, 1.0).unwrap();
-    let smooth = Exact::new(&transfer, field::Kind::Scalar, &[Normal { mid: 0.0, half: 1.0 }; 4], 1.0);
+    let smooth = Exact::new(&transfer, field::Kind::Scalar, &[Normalization { mid: 0.0, half: 1.0 }; 4], 1.0);
     let mut last = f64::INFINITY;
     for n in [16, 32, 64] {
         let volume = Table::new(&smooth, Kind::Uniform, [n; 3], 2.0).unwrap();
@@ -145,7 +145,7 @@ fn polynomials_of_higher_degree_are_better() {
         let bands = exact(&bands, emission);
         let rms = [1, 2, 4].map(|degree| {
             let table = Polynomial::new(&bands, degree, 128, 1.0).unwrap();
-            // Between texels the values' own resolution would be judged.
+            // Between texels the values' own resolution would be measured.
             let near = |s: f64| value(((s + 1.0) * 63.5).round() as u32, 128);
             let mut sum = 0.0;
             for [front, back, l] in segments().map(|[f, b, l]| [near(f), near(b), l]) {
@@ -183,7 +183,7 @@ fn limits_are_finite() {
     let color = vec![(-1.0, [1.0, 0.2, 0.0]), (1.0, [0.4, 0.4, 0.4])];
     let opacity = vec![(-1.0, 0.0), (-0.2, 1.0), (0.2, 1.0), (0.5, 0.0), (1.0, 0.0)];
     let opaque = TransferFunction::new(color, opacity, 1.0).unwrap().with_convention(Convention::Opacity);
-    let opaque = Exact::new(&opaque, field::Kind::Scalar, &[Normal { mid: 0.0, half: 1.0 }; 4], 1.0);
+    let opaque = Exact::new(&opaque, field::Kind::Scalar, &[Normalization { mid: 0.0, half: 1.0 }; 4], 1.0);
     for (exact, longest) in [(&peak, 1.0), (&opaque, 1.0), (&opaque, 1e-6), (&opaque, 1e6), (&peak, 1e-30)] {
         for kind in [Kind::Uniform, Kind::Log, Kind::LogNormalised] {
             let size = [17, 17, 12];
@@ -207,7 +207,8 @@ fn functions() -> Vec<(&'static str, Exact<f64>)> {
 }
 
 fn functions_of(seed: u64) -> Vec<(&'static str, Exact<f64>)> {
-    let exact = |t: &TransferFunction| Exact::new(t, field::Kind::Scalar, &[Normal { mid: 0.0, half: 1.0 }; 4], 1.0);
+    let exact =
+        |t: &TransferFunction| Exact::new(t, field::Kind::Scalar, &[Normalization { mid: 0.0, half: 1.0 }; 4], 1.0);
     transfers(seed).iter().map(|(name, transfer)| (*name, exact(transfer))).collect()
 }
 
@@ -359,13 +360,13 @@ fn cheaper_texels_cost_what_they_should() {
 }
 
 /// A table's errors, and the bound on them.
-struct Judged<'a> {
+struct Compared<'a> {
     exact: &'a Exact<f64>,
     bound: f64,
     look_up: &'a (dyn Fn(f64, f64, f64) -> [f64; 4] + Sync),
 }
 
-impl Judged<'_> {
+impl Compared<'_> {
     fn error(&self, [f, b, l]: [f64; 3], want: [f64; 4]) -> f64 {
         let got = (self.look_up)(f, b, l);
         (0..4).fold(0.0, |m, k| m.max((got[k] - want[k]).abs()))
@@ -409,21 +410,21 @@ fn errors_are_within_their_bounds() {
         [(32, 17, 2.0), (64, 33, 2.0), (128, 65, 2.0), (64, 17, 0.05), (200, 9, 0.05), (256, 33, 2.0), (256, 9, 0.05)];
     let functions = (1..if long { 13 } else { 3 }).flat_map(functions_of);
     let cases: Vec<_> = functions.flat_map(|f| sizes.map(|size| (f.clone(), size))).collect();
-    let judge = |((name, exact), (n, slices, longest)): &((&str, Exact<f64>), (u32, u32, f64))| {
+    let compare = |((name, exact), (n, slices, longest)): &((&str, Exact<f64>), (u32, u32, f64))| {
         let (n, longest) = (*n, *longest);
         // Half of them within two texels of the diagonal, where functions are seen as they are.
         let near = |i: usize, f: f64, b: f64| {
             if i.is_multiple_of(2) { b } else { (f + 4.0 * b / f64::from(n)).clamp(-1.0, 1.0) }
         };
-        let judged = |(i, [f, b, l]): (usize, [f64; 3])| {
+        let compared = |(i, [f, b, l]): (usize, [f64; 3])| {
             let (b, l) = (near(i, f, b), longest * l);
             ([f, b, l], published(exact, f, b, l))
         };
-        let segments: Vec<_> = segments().enumerate().take(10_000).map(judged).collect();
+        let segments: Vec<_> = segments().enumerate().take(10_000).map(compared).collect();
         let mut wrong = vec![];
         let mut hold = |what: &str, bound: Option<f64>, look_up: &(dyn Fn(f64, f64, f64) -> [f64; 4] + Sync)| {
             let share =
-                Judged { exact, bound: bound.unwrap(), look_up }.share(&segments, 2.0 / f64::from(n - 1), longest);
+                Compared { exact, bound: bound.unwrap(), look_up }.share(&segments, 2.0 / f64::from(n - 1), longest);
             if !(0.05..=1.0).contains(&share) {
                 wrong.push(format!("{name}, direct {}, {what}, {n}, {longest}: {share:.3} of the bound", exact.direct));
             }
@@ -446,7 +447,7 @@ fn errors_are_within_their_bounds() {
         }
         wrong
     };
-    let wrong: Vec<String> = cases.par_iter().flat_map_iter(judge).collect();
+    let wrong: Vec<String> = cases.par_iter().flat_map_iter(compare).collect();
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 

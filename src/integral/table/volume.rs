@@ -234,8 +234,8 @@ pub(super) fn normalised(
         };
         return [mean(1), mean(2), mean(3), density];
     }
-    let Light { color, through } = light(exact, front, back, l);
-    let alpha = if depth > 1e-3 { 1.0 - through } else { -(-depth).exp_m1() };
+    let Light { color, transmittance } = light(exact, front, back, l);
+    let alpha = if depth > 1e-3 { 1.0 - transmittance } else { -(-depth).exp_m1() };
     let seen = if exact.direct { alpha / extinction } else { alpha };
     let [r, g, b] = color.map(|c| c / seen);
     [r, g, b, density]

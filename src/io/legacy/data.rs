@@ -1,7 +1,7 @@
 //! The arrays of a legacy file. One that is not whole is left out, with what is wrong with it.
 
 use super::Parts;
-use super::scan::{Fault, Scanner, Type};
+use super::scan::{Scanner, Type};
 use crate::mesh::{Array, LeftOut, Role, Values};
 
 /// The keywords of sections that hold one array of points or cells, and what it is for.
@@ -96,7 +96,7 @@ impl Parts {
     }
 
     /// The numbers of an array of a field, at byte `at`; none if they are not kept.
-    fn field(&mut self, from: &mut Scanner<'_>, array: Described, at: usize) -> Result<Option<Array>, Fault> {
+    fn field(&mut self, from: &mut Scanner<'_>, array: Described, at: usize) -> Result<Option<Array>, String> {
         let Described { name, components, tuples, kind } = array;
         let values = from.values(kind, components.checked_mul(tuples))?;
         let Some((_, needed)) = self.current else { return Ok(None) };
@@ -114,7 +114,7 @@ impl Parts {
     }
 
     /// An array of points or cells that says by its keyword what it is for; none if it is not kept.
-    fn attribute(&mut self, from: &mut Scanner<'_>, keyword: &str, name: &mut String) -> Result<Option<Array>, Fault> {
+    fn attribute(&mut self, from: &mut Scanner<'_>, keyword: &str, name: &mut String) -> Result<Option<Array>, String> {
         let at = from.at();
         *name = from.word("its name")?;
         let colors = Type::from_name(if from.binary { "unsigned_char" } else { "float" }, from.binary)?;
@@ -166,7 +166,7 @@ impl Parts {
         }
     }
 
-    fn leave_out(&mut self, name: &str, keyword: &str, at: usize, what: Fault) {
+    fn leave_out(&mut self, name: &str, keyword: &str, at: usize, what: String) {
         let name = decoded(name);
         let of = self.current.map_or(0, |current| current.0);
         let why = format!("{keyword} array \"{}\", at byte {at}: {what}", name.escape_debug());
@@ -175,7 +175,7 @@ impl Parts {
 }
 
 /// What comes before the numbers of an array of field data: its name, components, tuples and type.
-fn described(from: &mut Scanner<'_>, name: &mut String) -> Result<Option<Described>, Fault> {
+fn described(from: &mut Scanner<'_>, name: &mut String) -> Result<Option<Described>, String> {
     *name = from.word("the name of an array")?;
     if name == "NULL_ARRAY" {
         return Ok(None);

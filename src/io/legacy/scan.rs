@@ -6,10 +6,7 @@ use crate::io::number::{Kind, Number, with_kind};
 use crate::memory;
 use crate::mesh::Values;
 
-/// Why a file cannot be read; the place is added to it.
-pub(super) type Fault = String;
-
-/// A place in a legacy file.
+/// A place in a legacy file. Methods that cannot read on say why, as text to which the place is added.
 pub(super) struct Scanner<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -65,7 +62,7 @@ pub(super) enum Type {
 
 impl Type {
     /// The type of that name, which is told by VTK's writer. Ids have 64 bits, of which binary files hold 32.
-    pub(super) fn from_name(name: &str, binary: bool) -> Result<Type, Fault> {
+    pub(super) fn from_name(name: &str, binary: bool) -> Result<Type, String> {
         let kind = match name.to_ascii_lowercase().as_str() {
             "char" | "signed_char" | "vtktypeint8" => Kind::I8,
             "unsigned_char" | "vtktypeuint8" => Kind::U8,
@@ -120,7 +117,7 @@ impl<'a> Scanner<'a> {
     }
 
     /// The next word, which must be there.
-    pub(super) fn word(&mut self, what: &str) -> Result<String, Fault> {
+    pub(super) fn word(&mut self, what: &str) -> Result<String, String> {
         let word = self.bytes_of_word().ok_or_else(|| format!("the file ends before {what}"))?;
         Ok(String::from_utf8_lossy(word).into_owned())
     }
@@ -137,7 +134,7 @@ impl<'a> Scanner<'a> {
         found
     }
 
-    pub(super) fn count(&mut self, what: &str) -> Result<usize, Fault> {
+    pub(super) fn count(&mut self, what: &str) -> Result<usize, String> {
         let word = self.word(what)?;
         word.parse().map_err(|_| format!("{what} is \"{}\", not a count", word.escape_debug()))
     }
@@ -254,7 +251,7 @@ impl<'a> Scanner<'a> {
 
     /// Checks that an array, whose lines start at byte `start`, ends where something else starts: that it is as long as
     /// it says.
-    pub(super) fn check_end(&mut self, start: usize, in_field: bool) -> Result<(), Fault> {
+    pub(super) fn check_end(&mut self, start: usize, in_field: bool) -> Result<(), String> {
         let end = self.at;
         if self.is_at_end() || self.is_at_section() || in_field && self.is_field(self.at) {
             return Ok(());
@@ -275,7 +272,7 @@ impl<'a> Scanner<'a> {
     }
 
     /// Reads as many values, which start on the next line if they are no text; none if they are strings.
-    pub(super) fn values(&mut self, what: Type, count: Option<usize>) -> Result<Option<Values>, Fault> {
+    pub(super) fn values(&mut self, what: Type, count: Option<usize>) -> Result<Option<Values>, String> {
         let count = count.ok_or("there are more values than any file can hold")?;
         if what == Type::Strings {
             self.line();
@@ -308,7 +305,7 @@ impl<'a> Scanner<'a> {
 
     /// Passes a string: in text a line, else bytes after their number, of which the first two bits say how long it is
     /// itself.
-    fn string(&mut self) -> Result<(), Fault> {
+    fn string(&mut self) -> Result<(), String> {
         if self.rest().is_empty() {
             return Err("the file ends inside the array".to_owned());
         }
@@ -332,7 +329,7 @@ impl<'a> Scanner<'a> {
     }
 
     /// Passes the rest of the line of scalars, and the name of their table of colours if it follows.
-    pub(super) fn pass_table(&mut self) -> Result<(), Fault> {
+    pub(super) fn pass_table(&mut self) -> Result<(), String> {
         let before = self.at;
         self.line();
         if self.pass("LOOKUP_TABLE") {
@@ -343,7 +340,7 @@ impl<'a> Scanner<'a> {
         }
     }
 
-    fn take(&mut self, bytes: usize) -> Result<&'a [u8], Fault> {
+    fn take(&mut self, bytes: usize) -> Result<&'a [u8], String> {
         let taken = self.rest().get(..bytes);
         let taken = taken.ok_or_else(|| format!("the file ends after {} of its {bytes} bytes", self.rest().len()))?;
         self.at += bytes;
@@ -351,7 +348,7 @@ impl<'a> Scanner<'a> {
     }
 
     /// What was asked of the memory, with a lack of it as any other fault.
-    pub(super) fn had<T>(&mut self, answer: crate::Result<T>) -> Result<T, Fault> {
+    pub(super) fn had<T>(&mut self, answer: crate::Result<T>) -> Result<T, String> {
         answer.map_err(|error| {
             let what = error.to_string();
             self.lacking = Some(error);
@@ -360,7 +357,7 @@ impl<'a> Scanner<'a> {
     }
 
     /// The next numbers. Those of binary files have their highest byte first.
-    pub(super) fn numbers<T: Number>(&mut self, count: usize) -> Result<Vec<T>, Fault> {
+    pub(super) fn numbers<T: Number>(&mut self, count: usize) -> Result<Vec<T>, String> {
         if self.binary {
             let bytes = self.take(count.saturating_mul(size_of::<T>()))?;
             let mut numbers: Vec<T> = self.had(memory::zeroed("an array", count))?;

@@ -1,6 +1,6 @@
 //! Legacy files of grids that list no cells: STRUCTURED_POINTS, RECTILINEAR_GRID and STRUCTURED_GRID.
 
-use super::scan::{Fault, Scanner, Type};
+use super::scan::{Scanner, Type};
 use super::{Parts, told};
 use crate::error::{Error, Result};
 use crate::grid::{self, Grid, Lattice};
@@ -51,7 +51,7 @@ impl Axes {
 
 impl Parts {
     /// Reads a section that says something of the axes.
-    pub(super) fn axis(&mut self, from: &mut Scanner<'_>, keyword: &str) -> Result<(), Fault> {
+    pub(super) fn axis(&mut self, from: &mut Scanner<'_>, keyword: &str) -> Result<(), String> {
         let Some(axes) = &mut self.axes else { return Ok(()) };
         match keyword {
             "DIMENSIONS" => {
@@ -79,12 +79,12 @@ impl Parts {
     }
 }
 
-fn whole(from: &mut Scanner<'_>) -> Result<i32, Fault> {
+fn whole(from: &mut Scanner<'_>) -> Result<i32, String> {
     let word = from.word("an index")?;
     word.parse().map_err(|_| format!("\"{}\" is not an index", word.escape_debug()))
 }
 
-fn triple(from: &mut Scanner<'_>) -> Result<DVec3, Fault> {
+fn triple(from: &mut Scanner<'_>) -> Result<DVec3, String> {
     let mut next = || {
         let word = from.word("three numbers")?;
         f64::parse(&word).ok_or_else(|| format!("\"{}\" is not a number", word.escape_debug()))

@@ -25,7 +25,7 @@ use glam::{DMat3, DVec3};
 use inward::Filling;
 use kernel::{Plane, deepest};
 use pieces::Pieces;
-use shell::{Fault, Frame};
+use shell::{ShellFault, ShellFrame};
 use std::collections::HashMap;
 
 /// A point sees a face well if it is so far behind it; the polyhedron reaches about 1 from the origin.
@@ -181,8 +181,8 @@ impl Cut {
         }
         match self.solve(points) {
             Ok(solved) => Split::Solved(solved),
-            Err(Fault::Open) => Split::Open,
-            Err(Fault::Flat) => Split::Flat,
+            Err(ShellFault::Open) => Split::Open,
+            Err(ShellFault::Flat) => Split::Flat,
         }
     }
 
@@ -232,7 +232,7 @@ impl Cut {
     }
 
     /// Splits a polyhedron whose faces look anywhere, and of any shape.
-    fn solve(&self, points: &[DVec3]) -> Result<Solved, Fault> {
+    fn solve(&self, points: &[DVec3]) -> Result<Solved, ShellFault> {
         // Points at one position are one.
         let mut own: Vec<u32> = vec![];
         let mut number: HashMap<u32, u32> = HashMap::new();
@@ -244,7 +244,7 @@ impl Cut {
         }
         let world: Vec<DVec3> = own.iter().map(|p| points[*p as usize]).collect();
         let listed: Vec<[u32; 3]> = self.triangles.iter().map(|t| t.map(|p| number[&p])).collect();
-        let frame = Frame::of(&world).ok_or(Fault::Flat)?;
+        let frame = ShellFrame::of(&world).ok_or(ShellFault::Flat)?;
         let places: Vec<DVec3> = world.iter().map(|p| frame.local(*p)).collect();
         let surface = shell::close(&places, &listed)?;
         let cell = Closed { own: &own, points, places: &places, surface: &surface, signs: Signs::new(self, points) };

@@ -3,7 +3,7 @@
 use super::curved::{self, Node, Recipe};
 use super::linear::{PRISM_5, PRISM_6, Shape, order, shape, split};
 use super::polyhedron::{Corner, Cut, Solved, Split};
-use super::{Added, Listed, Skipped, dimension, ghosts, mean, name};
+use super::{Listed, Skipped, SteinerPoints, dimension, ghosts, mean, name};
 use crate::error::{Error, Result};
 use crate::mesh::{Array, Mesh, POLYHEDRON, Polyhedra};
 use glam::DVec3;
@@ -198,9 +198,9 @@ impl<'a> Splitter<'a> {
         first: u32,
         corners: &mut [[u32; 4]],
         cell: &mut [u32],
-    ) -> (Added, Listed) {
+    ) -> (SteinerPoints, Listed) {
         let points = self.mesh.points();
-        let (mut at, mut added, mut crooked) = (0, Added::default(), Listed::default());
+        let (mut at, mut added, mut crooked) = (0, SteinerPoints::default(), Listed::default());
         let (mut cut, mut local) = (Cut::default(), Local::default());
         for c in range {
             let next = first + added.len() as u32;
@@ -261,7 +261,7 @@ impl<'a> Splitter<'a> {
     }
 
     /// Finds the lattice points of a curved cell with the points `ids`; those that it adds are numbered from `next` on.
-    fn place(&self, recipe: &Recipe, ids: &[u32], mut next: u32, added: &mut Added, local: &mut Local) {
+    fn place(&self, recipe: &Recipe, ids: &[u32], mut next: u32, added: &mut SteinerPoints, local: &mut Local) {
         let points = self.mesh.points();
         local.ids.clear();
         local.places.clear();

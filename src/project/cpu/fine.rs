@@ -12,8 +12,8 @@ use super::second::Kept;
 use super::setup::{Look, Record, Records, Scene};
 use crate::integral::{Batch, Integral, Light};
 use crate::order::crossings::{Crossings, pixel_at, place};
-use crate::order::screen::{ASIDE, NEAREST, TILE};
-use crate::traverse::cpu::least_light;
+use crate::order::screen::{NEAREST, ASIDE, TILE};
+use crate::traverse::cpu::least_transmittance;
 use crate::view::{Blend, View};
 use fearless_simd::Simd;
 
@@ -191,7 +191,7 @@ impl<const N: usize> Canvas<N> {
         );
         self.found.clear();
         if self.fragments >= self.glance {
-            self.rest(least_light(integral.exact.direct), scene.blend);
+            self.rest(least_transmittance(integral.exact.direct), scene.blend);
         }
     }
 
@@ -246,7 +246,7 @@ impl<const N: usize> Canvas<N> {
             return;
         }
         let [r, g, b, t] = self.light_at(at);
-        let mut light = Light { color: [r, g, b], through: t };
+        let mut light = Light { color: [r, g, b], transmittance: t };
         match integral.table {
             None => {
                 self.batch.add(integral.exact, front, back, length, &mut light);
@@ -255,7 +255,7 @@ impl<const N: usize> Canvas<N> {
             Some(table) => table.add_components(integral.exact, front, back, length, &mut light),
         }
         let [r, g, b] = light.color;
-        let all = [r, g, b, light.through];
+        let all = [r, g, b, light.transmittance];
         self.light.iter_mut().zip(all).for_each(|(channel, v)| channel[at] = v);
     }
 
@@ -279,7 +279,8 @@ impl<const N: usize> Canvas<N> {
                 if !self.lives(at) {
                     continue;
                 }
-                let (column, row) = (f64::from(self.corner[0] + i) + ASIDE.x, f64::from(self.corner[1] + j) + ASIDE.y);
+                let (column, row) =
+                    (f64::from(self.corner[0] + i) + ASIDE.x, f64::from(self.corner[1] + j) + ASIDE.y);
                 let Some([mut enter, mut leave]) = cell.depths(column, row) else { continue };
                 let key = |w: f64| lens.key(w) as f32;
                 let (key_in, key_out) = (key(enter), key(leave));
@@ -318,7 +319,7 @@ impl<const N: usize> Canvas<N> {
             }
         }
         if self.fragments >= self.glance {
-            self.rest(least_light(integral.exact.direct), scene.blend);
+            self.rest(least_transmittance(integral.exact.direct), scene.blend);
         }
     }
 
@@ -375,7 +376,7 @@ impl<const N: usize> Canvas<N> {
         mut flawed: impl FnMut(u32, u32, Flaw),
     ) -> u64 {
         let least = match scene.blend {
-            Blend::Composite => least_light(integral.exact.direct),
+            Blend::Composite => least_transmittance(integral.exact.direct),
             Blend::Maximum => f32::NEG_INFINITY,
         };
         let mut covered = 0;

@@ -2,7 +2,7 @@
 
 pub(super) use crate::integral::floats::{Floats, LANES};
 use crate::integral::floats::{exp, series};
-use crate::integral::{GAUSS_6, MILD, PANEL, Piece};
+use crate::integral::{GAUSS_6, GAUSS_DEPTH, Piece, SERIES_DEPTH};
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
 
@@ -20,14 +20,14 @@ pub(super) fn piece<S: Simd>(simd: S, x: Floats<S>, y: Floats<S>, direct: bool) 
     if !direct && most(FAINT) == 0 {
         return faint(simd, x, y);
     }
-    if most(MILD as f32) == 0 {
+    if most(SERIES_DEPTH as f32) == 0 {
         return mild(simd, x, y, direct);
     }
     let [alpha, front, back] = moderate(simd, x, y, direct);
-    let deep = most(PANEL as f32);
+    let deep = most(GAUSS_DEPTH as f32);
     // Faint lanes beside deeper ones keep their digits.
     let [a, f, b] = mild(simd, x, y, direct);
-    let near = steepest.simd_le(Floats::splat(simd, MILD as f32));
+    let near = steepest.simd_le(Floats::splat(simd, SERIES_DEPTH as f32));
     let all = [near.select(a, alpha), near.select(f, front), near.select(b, back)];
     if deep == 0 { all } else { deeper(simd, x, y, direct, deep, all) }
 }
@@ -49,7 +49,7 @@ fn faint<S: Simd>(simd: S, x: Floats<S>, y: Floats<S>) -> [Floats<S>; 3] {
     [alpha, alpha - back, back]
 }
 
-/// Up to a depth of 1: `Piece::mild`.
+/// Up to a depth of 1: `Piece::by_series`.
 #[inline(always)]
 fn mild<S: Simd>(simd: S, x: Floats<S>, y: Floats<S>, direct: bool) -> [Floats<S>; 3] {
     const Q: [f32; 8] =

@@ -185,13 +185,13 @@ fn integral<S: Simd>(simd: S, a: &[Floats<S>; 6], u: Floats<S>) -> Floats<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field::{Kind, Normal};
+    use crate::field::{Kind, Normalization};
     use crate::integral::Exact;
     use crate::transfer::TransferFunction;
 
     fn knots_of(color: Vec<(f64, [f64; 3])>, opacity: Vec<(f64, f64)>) -> Knots<f32> {
         let transfer = TransferFunction::new(color, opacity, 1.0).unwrap();
-        Exact::<f32>::new(&transfer, Kind::Scalar, &[Normal { mid: 0.0, half: 1.0 }; 4], 1.0).opacity
+        Exact::<f32>::new(&transfer, Kind::Scalar, &[Normalization { mid: 0.0, half: 1.0 }; 4], 1.0).opacity
     }
 
     #[test]

@@ -189,7 +189,7 @@ impl<const N: usize> Canvas<N> {
             let (length, place) = (of(Row::<N>::LENGTH), lens.point(column, row, start + first));
             let light = self.kept.integrate(two, [front, back], place, lens.direction(column, row), length);
             let [red, green, blue] = light.color;
-            for (k, v) in [red, green, blue, 1.0 - light.through].into_iter().enumerate() {
+            for (k, v) in [red, green, blue, 1.0 - light.transmittance].into_iter().enumerate() {
                 self.kept.room.rows[Row::<N>::LIGHT + k][at] = v;
             }
         }
@@ -235,7 +235,7 @@ impl<const N: usize> Canvas<N> {
         for (channel, emitted) in self.light.iter_mut().zip(light.color) {
             channel[at] += through * emitted;
         }
-        self.light[3][at] = through * light.through;
+        self.light[3][at] = through * light.transmittance;
     }
 }
 

@@ -17,10 +17,10 @@
 use super::doubles::{by_cell, cross, guard, single, singles, terms, turn, wide};
 use super::outline::{Blocks, add_blocks};
 use super::runs::Runs;
-use crate::geometry::{Cell, Geometry, Values};
+use crate::geometry::{Cell, TetMesh, Values};
 use crate::integral::Exact;
 use crate::memory::prefetch;
-use crate::order::screen::{ASIDE, Lens, NEAREST, PixelBox, TILE};
+use crate::order::screen::{Lens, NEAREST, ASIDE, PixelBox, TILE};
 use crate::view::Blend;
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, f64x8, i32x8, u8x16};
@@ -148,7 +148,7 @@ static FRONTS_FIRST: [[u8; 16]; 16] = {
 /// What records are made from.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Scene<'a, const N: usize> {
-    pub(super) geometry: &'a Geometry,
+    pub(super) geometry: &'a TetMesh,
     pub(super) values: &'a Values<N>,
     pub(super) exact: &'a Exact<f32>,
     /// The lines of the function.

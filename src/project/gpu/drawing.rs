@@ -1,15 +1,14 @@
 //! Projecting and drawing the batches of a frame.
 
-use super::record::Layout;
+use super::primitive::Layout;
 use super::{BATCH, Pass, Project, Slice, groups_of, unprepared};
 use crate::error::Result;
 use crate::gpu::buffers::Buffer;
 use crate::gpu::clock::{CLOCKS, Clock};
 use crate::gpu::raster::{self, Readback, Texture};
 use crate::gpu::rays::FAR;
-use crate::project::Counts;
+use crate::project::ProjectionCounts;
 use crate::view::View;
-use std::time::Instant;
 use wgpu::{BufferUsages as Usage, TextureUsages};
 
 /// Batches that are handed over at once: a driver ends work that takes seconds.
@@ -20,7 +19,7 @@ pub(super) struct Canvas {
     layout: Layout,
     size: [u32; 2],
     format: wgpu::TextureFormat,
-    records: Buffer,
+    primitives: Buffer,
     indices: Buffer,
     picture: Texture,
     /// Where the greatest of something is kept, how great that is.
@@ -49,8 +48,13 @@ impl Project {
         let texture =
             |name, format, usage| Texture::new(gpu, name, wgpu::TextureDimension::D2, [w, h, 1], format, usage);
         let canvas = Canvas {
-            // One more, as the last one's vertices look for words beyond it.
-            records: Buffer::new(gpu, "records", layout.bytes() * (BATCH as u64 + 1), Usage::STORAGE | Usage::VERTEX)?,
+            // One more, as the last one's vertices look for attributes beyond it.
+            primitives: Buffer::new(
+                gpu,
+                "primitives",
+                layout.bytes() * (BATCH as u64 + 1),
+                Usage::STORAGE | Usage::VERTEX,
+            )?,
             indices: Buffer::holding(gpu, "indices", &all, Usage::INDEX)?,
             picture: texture("picture", format, TextureUsages::RENDER_ATTACHMENT | TextureUsages::COPY_SRC)?,
             depth: keeps_greatest
@@ -66,7 +70,7 @@ impl Project {
     }
 
     /// Projects and draws all batches.
-    pub(super) fn draw(&self, frame: &Pass, view: &View, counts: &mut Counts) -> Result<Vec<[f32; 4]>> {
+    pub(super) fn draw(&self, frame: &Pass, view: &View, counts: &mut ProjectionCounts) -> Result<Vec<[f32; 4]>> {
         let gpu = &self.gpu;
         let (Some(program), Some(canvas), Some(ordered)) = (self.programs.first(), &self.canvas, &self.ordered) else {
             return Err(unprepared());
@@ -90,10 +94,6 @@ impl Project {
 
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         self.clear(&mut encoder, canvas);
-        // Devices in software tell no times of their parts: the host waits for each, which costs them nothing.
-        let is_software = gpu.adapter.kind == "CPU";
-        let (mut project_ms, mut since) = (0.0, Instant::now());
-        let begun = since;
         for (i, &first) in firsts.iter().enumerate() {
             let count = (ordered.entries - first).min(BATCH);
             let slice = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
@@ -102,7 +102,7 @@ impl Project {
                 size: std::num::NonZeroU64::new(size_of::<Slice>() as u64),
             });
             let order = &ordered.chunks[first / ordered.chunk];
-            let own = self.own_group(frame, slice, &none, order, canvas.records.raw.as_entire_binding());
+            let own = self.own_group(frame, slice, &none, order, canvas.primitives.raw.as_entire_binding());
             {
                 let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
                     label: Some("project"),
@@ -114,12 +114,6 @@ impl Project {
                 pass.set_bind_group(1, &frame.arrays, &[]);
                 pass.set_bind_group(2, &own, &[]);
                 pass.dispatch_workgroups(groups[0], groups[1], 1);
-            }
-            if is_software {
-                gpu.queue.submit([encoder.finish()]);
-                gpu.wait()?;
-                project_ms += since.elapsed().as_secs_f64() * 1e3;
-                encoder = gpu.device.create_command_encoder(&Default::default());
             }
             {
                 let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -133,7 +127,7 @@ impl Project {
                 pass.set_bind_group(0, &frame.shared, &[]);
                 for part in 0..program.layout.parts {
                     let from = u64::from(part) * program.layout.part_bytes();
-                    pass.set_vertex_buffer(part, canvas.records.raw.slice(from..));
+                    pass.set_vertex_buffer(part, canvas.primitives.raw.slice(from..));
                 }
                 pass.set_index_buffer(canvas.indices.raw.slice(..), wgpu::IndexFormat::Uint32);
                 let counter = clock.as_ref().and_then(|c| c.fragments.as_ref()).filter(|_| i < CLOCKS as usize / 4);
@@ -145,18 +139,10 @@ impl Project {
                     pass.end_pipeline_statistics_query();
                 }
             }
-            if is_software || (i + 1) % AT_ONCE == 0 {
+            if (i + 1) % AT_ONCE == 0 {
                 gpu.queue.submit([encoder.finish()]);
                 encoder = gpu.device.create_command_encoder(&Default::default());
             }
-            if is_software {
-                gpu.wait()?;
-                since = Instant::now();
-            }
-        }
-        if is_software {
-            let all = begun.elapsed().as_secs_f64() * 1e3;
-            (counts.project_ms, counts.draw_ms) = (Some(project_ms), Some(all - project_ms));
         }
         let [w, h] = view.size();
         let row = row_bytes(w, format);
@@ -183,9 +169,7 @@ impl Project {
                 let period = f64::from(gpu.queue.get_timestamp_period()) / 1e6;
                 let sum =
                     |at: usize| times.chunks(4).map(|t| t[at + 1].saturating_sub(t[at])).sum::<u64>() as f64 * period;
-                if !is_software {
-                    (counts.project_ms, counts.draw_ms) = (Some(sum(0)), Some(sum(2)));
-                }
+                (counts.project_ms, counts.draw_ms) = (Some(sum(0)), Some(sum(2)));
             }
             picture.chunks(row as usize).flat_map(|line| pixels(&line[..w as usize * texel(format)], format)).collect()
         })

@@ -1,10 +1,10 @@
 //! What a frame's shaders need to know of a view and a transfer function.
 
-use crate::geometry::Geometry;
+use crate::geometry::TetMesh;
 use crate::gpu::rays::{self, FAR};
 use crate::view::View;
 use bytemuck::{Pod, Zeroable};
-use glam::{DMat3, DVec3, Vec3, Vec4};
+use glam::{DMat3, DVec3};
 
 /// Up to this distance from the mesh's centre, in normalised units, rays start at the eye.
 const NEAR_EYE: f64 = 2.0;
@@ -16,10 +16,10 @@ pub(super) const GROWTH: f32 = 1.0 / 256.0;
 /// special.
 const NEAREST: f64 = 1e-4;
 
-/// `Frame` in the shaders.
+/// `ViewUniforms` in the shaders.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct Frame {
+pub(super) struct ViewUniforms {
     base: [f32; 4],
     base_low: [f32; 4],
     across: [[f32; 4]; 2],
@@ -38,26 +38,9 @@ pub(super) struct Frame {
     unused: [f32; 2],
 }
 
-impl Frame {
-    /// The place that coordinates are relative to.
-    pub(super) fn base(&self) -> DVec3 {
-        [self.base, self.base_low].map(|v| Vec4::from(v).truncate().as_dvec3()).into_iter().sum()
-    }
-
-    /// What a point is multiplied with for its place in the image, to the right and up, times its depth, and for that.
-    pub(super) fn axes(&self) -> [Vec3; 3] {
-        [self.across[0], self.across[1], self.forward].map(|v| Vec4::from(v).truncate())
-    }
-
-    /// The depth of the base in a perspective view.
-    pub(super) fn ahead(&self) -> f32 {
-        self.forward[3]
-    }
-}
-
 /// A view as the shaders see it.
-pub(super) struct Seen {
-    pub(super) frame: Frame,
+pub(super) struct SeenView {
+    pub(super) frame: ViewUniforms,
     pub(super) perspective: bool,
     /// The eye of a perspective view in normalised coordinates, and the direction of the view.
     pub(super) eye: Option<DVec3>,
@@ -76,8 +59,6 @@ pub(super) struct Limits {
     pub(super) range: bool,
     /// Whether rays meet at the eye.
     pub(super) perspective: bool,
-    /// Pixels along a side of the blocks that the rasteriser does at once.
-    pub(super) block: u32,
     /// One pair of a table's planes serves all fragments of a cell.
     pub(super) plane_per_cell: bool,
 }
@@ -89,7 +70,7 @@ impl Limits {
     }
 }
 
-impl Seen {
+impl SeenView {
     pub(super) fn limits(&self) -> Limits {
         let frame = &self.frame;
         // In perspective views the eye is a limit anyway.
@@ -100,11 +81,10 @@ impl Seen {
             range: frame.near > near || frame.far < FAR,
             perspective: self.perspective,
             plane_per_cell: false,
-            block: 1,
         }
     }
 
-    pub(super) fn new(geometry: &Geometry, view: &View) -> Self {
+    pub(super) fn new(geometry: &TetMesh, view: &View) -> Self {
         let fan = view.fan(geometry.centre, geometry.scale, NEAR_EYE);
         let base = fan.origin[0];
         let four = |v: DVec3, w: f64| v.extend(w).as_vec4().to_array();
@@ -115,7 +95,7 @@ impl Seen {
         let inverse = DMat3::from_cols(spans[0], spans[1], fan.direction[0]).inverse();
         let planes = rays::planes(view, geometry, base);
         let ends = rays::ends(view, &fan, geometry.scale, false);
-        let frame = Frame {
+        let frame = ViewUniforms {
             base: four(high, 0.0),
             base_low: four(base - high, 0.0),
             across: [0, 1].map(|k| four(inverse.row(k), 0.0)),
@@ -134,6 +114,6 @@ impl Seen {
             pixel: [2.0 / view.size()[0] as f32, -2.0 / view.size()[1] as f32],
         };
         let eye = view.eye().map(|eye| (eye - geometry.centre) * geometry.scale);
-        Seen { frame, perspective, eye, direction: view.forward(), planes, ends }
+        SeenView { frame, perspective, eye, direction: view.forward(), planes, ends }
     }
 }

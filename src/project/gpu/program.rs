@@ -3,17 +3,17 @@
 use super::Project;
 use super::frame::{GROWTH, Limits};
 use super::lines::{BINS, LINES_ACROSS};
-use super::record::Layout;
+use super::primitive::Layout;
 use crate::error::Result;
 use crate::gpu::arrays;
 use crate::gpu::raster::{self, Slot};
 use crate::gpu::rays::FAR;
-use crate::gpu::shader::{self, Array, Variant};
+use crate::gpu::shader::{self, ShaderArray, ShaderVariant};
 use crate::gpu::table::{self, TABLE};
-use crate::integral::Lookup;
-use crate::order::PART;
+use crate::integral::PreintegratedTable;
 use crate::order::depth::HIDDEN;
-use crate::project::{Compositing, Fragments, Switches, Thickness};
+use crate::order::{MOST_PARTS, PART};
+use crate::project::{Compositing, Fragments, ProjectionOptions, Thickness};
 use crate::view::Blend;
 use wgpu::ShaderStages as Stages;
 
@@ -22,7 +22,7 @@ const CELLS: &str = include_str!("../../../shaders/project_cells.wgsl");
 const LINES: &str = include_str!("../../../shaders/project_lines.wgsl");
 const SHADE: &str = include_str!("../../../shaders/project_shade.wgsl");
 
-/// For each form: its records, and how they are drawn.
+/// For each form: its primitives, and how they are drawn.
 const INTERSECTED: [&str; 2] = [
     include_str!("../../../shaders/project_intersected.wgsl"),
     include_str!("../../../shaders/project_intersected_draw.wgsl"),
@@ -36,11 +36,11 @@ const INTERPOLATED: [&str; 2] = [
 /// What a fragment is: light; or the larger of its two values, and a depth that rises with it. Of the value's bits, in a sequence
 /// that ascends, 29 fit between 0 and 1.
 const BLENDED: &str = "struct Fragment { @location(0) color: vec4f }
-fn fragment_of(front: Value, back: Value, length: f32, words: Words, at: vec2f, rank: u32) -> Fragment {
-    return Fragment(quantised(colored(front, back, length, words), at, rank));
+fn fragment_of(front: Value, back: Value, length: f32, attributes: Attributes, at: vec2f, rank: u32) -> Fragment {
+    return Fragment(quantised(colored(front, back, length, attributes), at, rank));
 }\n";
 const LARGEST: &str = "struct Fragment { @location(0) values: vec4f, @builtin(frag_depth) depth: f32 }
-fn fragment_of(front: Value, back: Value, length: f32, words: Words, at: vec2f, rank: u32) -> Fragment {
+fn fragment_of(front: Value, back: Value, length: f32, attributes: Attributes, at: vec2f, rank: u32) -> Fragment {
     let is_front = last_of(front) > last_of(back);
     let largest = select(back, front, is_front);
     let bits = bitcast<u32>(last_of(largest));
@@ -50,13 +50,16 @@ fn fragment_of(front: Value, back: Value, length: f32, words: Words, at: vec2f, 
 
 /// How a frame is drawn.
 #[derive(Clone, Copy)]
-pub(super) struct Drawn<'a> {
-    pub(super) switches: &'a Switches,
+pub(super) struct DrawSettings<'a> {
+    pub(super) options: &'a ProjectionOptions,
     pub(super) blend: Blend,
 }
 
 /// Programs that are kept: edits of the function, and what cuts rays off, go to and fro between some.
 const KEPT: usize = 4;
+
+/// Pixels along a side of the blocks that rasterisers do at once.
+const BLOCK: f64 = 2.0;
 
 /// Loop iterations of a fragment that llvmpipe surely makes: see `traverse::gpu`.
 const MOST_WORK: u32 = 8000;
@@ -68,8 +71,7 @@ pub(super) struct Program {
     compositing: Compositing,
     pub(super) layout: Layout,
     pub(super) arrays: wgpu::BindGroupLayout,
-    /// On devices that sort.
-    pub(super) classify: Option<wgpu::ComputePipeline>,
+    pub(super) classify: wgpu::ComputePipeline,
     pub(super) project: wgpu::ComputePipeline,
     pub(super) draw: wgpu::RenderPipeline,
 }
@@ -77,14 +79,14 @@ pub(super) struct Program {
 impl Project {
     pub(super) fn compile(
         &mut self,
-        arrays: &[Array],
+        arrays: &[ShaderArray],
         source: String,
-        drawn: Drawn,
+        drawn: DrawSettings,
         layout: Layout,
         format: wgpu::TextureFormat,
     ) -> Result<()> {
-        let Drawn { switches, blend } = drawn;
-        let compositing = switches.compositing;
+        let DrawSettings { options, blend } = drawn;
+        let compositing = options.compositing;
         let same = |p: &Program| p.source == source && p.format == format && p.compositing == compositing;
         if let Some(known) = self.programs.iter().position(same) {
             self.programs[..=known].rotate_right(1);
@@ -105,15 +107,15 @@ impl Project {
             operation: wgpu::BlendOperation::Add,
         });
         // The outline of an intersected cell may be no more than that: grown, it need not turn one way.
-        let culled = (switches.fragments != Fragments::Intersected).then_some(wgpu::Face::Back);
+        let culled = (options.fragments != Fragments::Intersected).then_some(wgpu::Face::Back);
         let program = Program {
-            classify: self.sorts.then(|| raster::compute(gpu, &module, "classify", &cells)),
+            classify: raster::compute(gpu, &module, "classify", &cells),
             project: raster::compute(gpu, &module, "project_all", &cells),
             draw: raster::render(
                 gpu,
                 &module,
                 &drawing,
-                (layout.part_bytes(), &layout.attributes()),
+                (layout.part_bytes(), &layout.vertex_attributes()),
                 format,
                 blend,
                 culled,
@@ -133,49 +135,50 @@ impl Project {
 
 /// The whole program.
 pub(super) fn program(
-    variant: &Variant,
+    variant: &ShaderVariant,
     association: &str,
-    Drawn { switches, blend }: Drawn,
+    DrawSettings { options, blend }: DrawSettings,
     layout: &Layout,
-    table: Option<&Lookup>,
+    table: Option<&PreintegratedTable>,
     limits: Limits,
-    arrays: &[Array],
+    arrays: &[ShaderArray],
 ) -> String {
     let mut text = shader::prelude(variant);
     // Twice the area of the blocks that a line of unit length passes, by its mean direction.
-    let doubled = 2.0 * f64::from(limits.block) * 4.0 / std::f64::consts::PI;
+    let doubled = 2.0 * BLOCK * 4.0 / std::f64::consts::PI;
     for (name, value) in
         [("FAR", f64::from(FAR)), ("GROWTH", f64::from(GROWTH)), ("BESIDE", 1e-18), ("DOUBLED", doubled)]
     {
         text += &format!("const {name} = {value:?}f;\n");
     }
-    let form = match switches.fragments {
+    let form = match options.fragments {
         Fragments::Intersected => "INTERSECTED",
         Fragments::Interpolated => "INTERPOLATED",
         Fragments::Linear => "LINEAR",
     };
     for (name, value) in [
-        ("BY_DEPTH", switches.thickness == Thickness::Depth),
-        ("DITHERED", switches.dithers()),
-        ("ADDITIVE", switches.compositing == Compositing::Additive),
+        ("BY_DEPTH", options.thickness == Thickness::Depth),
+        ("DITHERED", options.dithers()),
+        ("ADDITIVE", options.compositing == Compositing::Additive),
         ("HAS_ENDS", limits.ends),
         ("HAS_PLANES", limits.planes),
         ("IS_CLIPPED", limits.range),
         ("PERSPECTIVE", limits.perspective),
+        ("SHOWS_ALL", blend == Blend::Maximum),
     ] {
         text += &format!("const {name} = {value};\n");
     }
     text += &format!(
-        "const LINES_ACROSS = {LINES_ACROSS}u;\nconst HIDDEN = {HIDDEN}u;\nconst BINS = {BINS}u;\nconst PART = {PART}u;\nconst MOST_WORK = {MOST_WORK}u;\n\
+        "const LINES_ACROSS = {LINES_ACROSS}u;\nconst HIDDEN = {HIDDEN}u;\nconst BINS = {BINS}u;\nconst PART = {PART}u;\nconst MOST_PARTS = {MOST_PARTS}u;\nconst MOST_WORK = {MOST_WORK}u;\n\
          const INTERSECTED = 0u;\nconst INTERPOLATED = 1u;\nconst LINEAR = 2u;\nconst FORM = {form};\n\
          const POINT = 0u;\nconst CORNER = 1u;\nconst CELL = 2u;\nconst ASSOCIATION = {association};\n"
     );
     text += arrays::POINT;
-    let [records, drawing] = if form == "INTERSECTED" { INTERSECTED } else { INTERPOLATED };
+    let [primitives, drawing] = if form == "INTERSECTED" { INTERSECTED } else { INTERPOLATED };
     text += &layout.wgsl();
     text += &shader::accessors(arrays);
     text += &table::constants(table, limits.plane_per_cell);
     text += &table::declarations(0, 6);
     text += if blend == Blend::Maximum { LARGEST } else { BLENDED };
-    [&text, shader::CELL, shader::INTEGRAL, TABLE, SHARED, LINES, CELLS, records, SHADE, drawing].join("\n")
+    [&text, shader::CELL, shader::INTEGRAL, TABLE, SHARED, LINES, CELLS, primitives, SHADE, drawing].join("\n")
 }

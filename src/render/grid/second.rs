@@ -3,8 +3,8 @@
 use crate::cast::second::{self, Two, spreads};
 use crate::cast::{Frame, Gradients, Samples, Volume};
 use crate::error::{Error, Result};
-use crate::field::{Association, Field, Normal};
-use crate::integral::choice;
+use crate::field::{Association, Field, Normalization};
+use crate::integral::options;
 use crate::integral::second::Second;
 use crate::transfer::TransferFunction;
 
@@ -18,7 +18,7 @@ pub(super) struct Extra {
 
 impl Extra {
     /// The transfer function is another.
-    pub(super) fn forget_function(&mut self) {
+    pub(super) fn invalidate_function(&mut self) {
         self.function = None;
     }
 
@@ -37,7 +37,7 @@ impl Extra {
         samples: &Samples,
         field: &Field,
         transfer: &TransferFunction,
-        how: choice::Two,
+        how: options::Two,
     ) -> Result<()> {
         if let (None, Some(array)) = (&self.array, field.second()) {
             self.array = Some(Samples::new(volume, array)?);
@@ -47,7 +47,7 @@ impl Extra {
             self.gradients = Some(Gradients::new(volume, samples)?);
         }
         // Values are handed over in their own units.
-        let own = Normal { mid: 0.0, half: 1.0 };
+        let own = Normalization { mid: 0.0, half: 1.0 };
         self.function.get_or_insert_with(|| Second::new(transfer, [own; 2], volume.centre(), volume.scale, how));
         Ok(())
     }

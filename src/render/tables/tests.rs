@@ -3,7 +3,7 @@
 use crate::field::{Component, Field};
 use crate::gpu::DeviceChoice;
 use crate::image::Image;
-use crate::integral::choice::{Choice, FEW_KNOTS, Form};
+use crate::integral::options::{FEW_KNOTS, Form, IntegrationOptions};
 use crate::mesh::{cells::Tetrahedra, generate};
 use crate::render::Renderer;
 use crate::transfer::TransferFunction;
@@ -36,8 +36,8 @@ fn draw(renderer: &mut Renderer) -> (Image, String) {
     (image, renderer.stats().integral.clone())
 }
 
-fn table() -> Choice {
-    Choice { table: Some([128, 128, 16]), ..Choice::of(Form::Volume) }
+fn table() -> IntegrationOptions {
+    IntegrationOptions { table: Some([128, 128, 16]), ..IntegrationOptions::of(Form::Volume) }
 }
 
 /// The first frame has its table. After an edit frames are exact, until the new table is there.
@@ -92,7 +92,7 @@ fn only_what_must_is_built_again() {
     let built = renderer.stats().table_ms;
     assert!(draw(&mut renderer).0 == first);
     assert_eq!(renderer.stats().table_ms, built);
-    renderer.set_integral(Choice::default());
+    renderer.set_integral(IntegrationOptions::default());
     assert_eq!(draw(&mut renderer).1, "exact");
     assert_eq!(renderer.stats().table_bytes, 0);
 }
@@ -100,7 +100,7 @@ fn only_what_must_is_built_again() {
 #[test]
 fn auto_counts_the_knots_of_cells() {
     let mut renderer = renderer();
-    renderer.set_integral(Choice { table: Some([64, 64, 0]), ..Choice::of(Form::Auto) });
+    renderer.set_integral(IntegrationOptions { table: Some([64, 64, 0]), ..IntegrationOptions::of(Form::Auto) });
     renderer.set_transfer(&function(5, 2.0));
     assert_eq!(draw(&mut renderer).1, "exact");
     let few = renderer.stats().knots_per_cell;
@@ -119,7 +119,7 @@ fn auto_counts_the_knots_of_cells() {
 fn what_no_table_can_hold_is_refused() {
     let mut renderer = renderer();
     renderer.set_transfer(&function(5, 2.0));
-    renderer.set_integral(Choice { table: Some([1, 1, 1]), ..table() });
+    renderer.set_integral(IntegrationOptions { table: Some([1, 1, 1]), ..table() });
     let refused = renderer.render(&view(), &|_| ()).unwrap_err().to_string();
     assert!(refused.contains("at least 2, 2 and 3"), "{refused}");
     renderer.set_integral(table());

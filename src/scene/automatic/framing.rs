@@ -17,8 +17,8 @@ const FILL: f64 = 0.94;
 const DIRECTIONS: [[f64; 2]; 4] = [[30.0, 25.0], [60.0, 25.0], [30.0, 50.0], [60.0, 50.0]];
 const BETTER: f64 = 1.25;
 
-/// Points that the area is judged by.
-const JUDGED: usize = 4096;
+/// Points that the area is estimated from.
+const SAMPLED: usize = 4096;
 
 /// A view of the whole mesh for pictures of `size` (width, height): perspective, z up, from the front right and above, or
 /// further from the side or above where flat or long meshes show more of themselves. What is drawn spans 94 % of the width
@@ -94,7 +94,7 @@ fn around(points: &[DVec3], camera: Camera, size: [u32; 2]) -> Camera {
 /// The area of the mesh's outline in a picture, in pixels, but for its bays.
 fn shown(points: &[DVec3], camera: Camera, size: [u32; 2]) -> f64 {
     let Ok(view) = View::new(camera, size) else { return 0.0 };
-    let step = points.len().div_ceil(JUDGED).max(1);
+    let step = points.len().div_ceil(SAMPLED).max(1);
     let seen = points.iter().step_by(step).filter_map(|&p| view.pixel(p));
     hull_area(&mut seen.collect::<Vec<DVec2>>())
 }

@@ -1,6 +1,6 @@
 //! What a walk hands its segments to: integrals of one variable, or of two.
 
-use super::least_light;
+use super::least_transmittance;
 use crate::integral::second::{Scratch, Second, Segment};
 use crate::integral::{Batch, Integral, Light};
 use crate::real::Real;
@@ -22,7 +22,7 @@ pub(super) trait Segments<const N: usize> {
     /// All of the ray is to be in `light`.
     fn end(&mut self, light: &mut Light<f32>);
     /// Transmittance below which nothing behind counts.
-    fn least_light(&self) -> f32;
+    fn least_transmittance(&self) -> f32;
     /// Panels so far.
     fn panels(&self) -> u64;
 }
@@ -62,8 +62,8 @@ impl<const N: usize> Segments<N> for One<'_> {
     }
 
     #[inline(always)]
-    fn least_light(&self) -> f32 {
-        least_light(self.integral.exact.direct)
+    fn least_transmittance(&self) -> f32 {
+        least_transmittance(self.integral.exact.direct)
     }
 
     fn panels(&self) -> u64 {
@@ -111,8 +111,8 @@ impl<const N: usize> Segments<N> for Two<'_> {
 
     fn end(&mut self, _: &mut Light<f32>) {}
 
-    fn least_light(&self) -> f32 {
-        least_light(self.second.is_direct())
+    fn least_transmittance(&self) -> f32 {
+        least_transmittance(self.second.is_direct())
     }
 
     fn panels(&self) -> u64 {

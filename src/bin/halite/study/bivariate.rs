@@ -8,8 +8,8 @@ use crate::{output, progress};
 use anyhow::{Context, Result};
 use halite::gpu::DeviceChoice;
 use halite::image::{Backdrop, Image};
-use halite::integral::choice::{Choice, Culling, Method, Silhouettes, Two, Weights};
-use halite::project::Switches;
+use halite::integral::options::{Culling, IntegrationOptions, Method, Silhouettes, Two, Weights};
+use halite::project::ProjectionOptions;
 use halite::render::{Engine, Renderer};
 use halite::scene::Scene;
 use halite::transfer::TransferFunction;
@@ -56,16 +56,19 @@ struct Figure {
 }
 
 /// A segment's integral in another form.
-fn two(method: Method, weights: Weights, culling: Culling) -> Choice {
-    Choice { two: Two { method, pieces: PIECES, weights, culling, ..Two::default() }, ..Choice::default() }
+fn two(method: Method, weights: Weights, culling: Culling) -> IntegrationOptions {
+    IntegrationOptions {
+        two: Two { method, pieces: PIECES, weights, culling, ..Two::default() },
+        ..IntegrationOptions::default()
+    }
 }
 
 /// The rows of the table: those after the first are of the Gaussian.
 fn variants() -> Vec<Variant> {
     let (adaptive, closed, hull) = (Method::Adaptive, Weights::Closed, Culling::Hull);
-    let variant = |name, place, integral| Variant { name, place, switches: Switches::default(), integral };
+    let variant = |name, place, integral| Variant { name, place, projection: ProjectionOptions::default(), integral };
     vec![
-        variant("one variable", "table 1, 1D", Choice::default()),
+        variant("one variable", "table 1, 1D", IntegrationOptions::default()),
         variant("adaptive", "", two(adaptive, closed, hull)),
         variant("analytic", "table 1, analytic", two(Method::Analytic, closed, hull)),
         variant("10 pieces, texture", "table 1, approximate", two(Method::Segmented, Weights::Texture, hull)),
@@ -133,7 +136,7 @@ fn studied(
             p(i as f64 / count);
             let transfer = if i == 0 { &one } else { &gaussian };
             if i < 2 {
-                truth = Some(picture(judge, transfer, Choice::default(), &view)?);
+                truth = Some(picture(judge, transfer, IntegrationOptions::default(), &view)?);
             }
             let image = picture(renderer, transfer, variant.integral, &view)?;
             culled.push(renderer.stats().culled_cells);
@@ -152,7 +155,7 @@ fn studied(
 fn picture(
     renderer: &mut Renderer,
     transfer: &TransferFunction,
-    integral: Choice,
+    integral: IntegrationOptions,
     view: &View,
 ) -> halite::Result<Image> {
     renderer.set_integral(integral);
@@ -174,16 +177,16 @@ fn figures(
     let drawn = progress::during("drawing figures", |p| {
         let draw = |(i, (name, place, transfer, drawn)): (usize, places::Shown)| {
             p(i as f64 / count);
-            let truth = picture(judge, &transfer, Choice::default(), &view)?;
+            let truth = picture(judge, &transfer, IntegrationOptions::default(), &view)?;
             let mut integral = match drawn {
                 As::Pieces => two(Method::Segmented, Weights::Texture, Culling::Hull),
-                As::Exact | As::Silhouettes => Choice::default(),
+                As::Exact | As::Silhouettes => IntegrationOptions::default(),
             };
             if drawn == As::Silhouettes {
                 integral.two.silhouettes = Silhouettes::Published;
             }
             let image = picture(renderer, &transfer, integral, &view)?;
-            let variant = Variant { name, place, switches: Switches::default(), integral };
+            let variant = Variant { name, place, projection: ProjectionOptions::default(), integral };
             let Row { image, max, rmse, frame_ms, .. } =
                 Row::measured(variant, image, &truth, options.frames, renderer, &view)?;
             Ok(Figure { name, place, image, truth, max, rmse, frame_ms })

@@ -6,9 +6,9 @@ use crate::{output, progress};
 use anyhow::{Context, Result};
 use halite::gpu::DeviceChoice;
 use halite::image::{Backdrop, Image};
-use halite::integral::choice::{Alpha, Choice, Form, Planes};
+use halite::integral::options::{Alpha, Form, IntegrationOptions, Planes};
 use halite::integral::table::Kind;
-use halite::project::{Fragments, Switches};
+use halite::project::{Fragments, ProjectionOptions};
 use halite::render::{Engine, Renderer, Stats};
 use halite::view::View;
 use serde_json::json;
@@ -25,30 +25,33 @@ struct Line {
 }
 
 /// All forms, of tables of this size if it was said; or those that are of interest where fragments are interpolated.
-fn forms(interpolated: bool, table: Option<[u32; 3]>) -> Vec<(&'static str, Choice)> {
-    let volume =
-        |lengths, slices| Choice { lengths, table: table.or(Some([256, 256, slices])), ..Choice::of(Form::Volume) };
-    let polynomial = |degree| Choice { degree, table, ..Choice::of(Form::Polynomial) };
-    let cylindrical = |planes, per_cell| Choice {
+fn forms(interpolated: bool, table: Option<[u32; 3]>) -> Vec<(&'static str, IntegrationOptions)> {
+    let volume = |lengths, slices| IntegrationOptions {
+        lengths,
+        table: table.or(Some([256, 256, slices])),
+        ..IntegrationOptions::of(Form::Volume)
+    };
+    let polynomial = |degree| IntegrationOptions { degree, table, ..IntegrationOptions::of(Form::Polynomial) };
+    let cylindrical = |planes, per_cell| IntegrationOptions {
         planes,
         per_cell,
         table: table.or(Some([PLANES; 3])),
-        ..Choice::of(Form::Cylindrical)
+        ..IntegrationOptions::of(Form::Cylindrical)
     };
     let two = |per_cell| cylindrical(Planes::Two, per_cell);
     if interpolated {
         return vec![
-            ("exact, interpolated", Choice::default()),
+            ("exact, interpolated", IntegrationOptions::default()),
             ("cylindrical, interpolated", two(false)),
             ("cylindrical, plane per cell", two(true)),
         ];
     }
     vec![
-        ("exact", Choice::default()),
+        ("exact", IntegrationOptions::default()),
         ("volume, uniform", volume(Kind::Uniform, 64)),
         ("volume, log", volume(Kind::Log, 16)),
         ("volume, log-normalised", volume(Kind::LogNormalised, 16)),
-        ("polynomial, linear alpha", Choice { alpha: Alpha::Linear, ..polynomial(1) }),
+        ("polynomial, linear alpha", IntegrationOptions { alpha: Alpha::Linear, ..polynomial(1) }),
         ("polynomial, degree 1", polynomial(1)),
         ("polynomial, degree 2", polynomial(2)),
         ("polynomial, degree 4", polynomial(4)),
@@ -62,33 +65,33 @@ pub(super) fn run(options: &Options, threads: usize) -> Result<()> {
     let given = options.request.scene()?;
     let size = options.request.studied(given.as_ref())?;
     let device = options.request.device(given.as_ref());
-    let mut judge = Renderer::with_device(threads, DeviceChoice::Cpu)?;
-    let job = judge.install(|| render::prepare(&options.request, given)?.of_mesh("study"))?;
+    let mut reference = Renderer::with_device(threads, DeviceChoice::Cpu)?;
+    let job = reference.install(|| render::prepare(&options.request, given)?.of_mesh("study"))?;
     let (view, _) = job.scene.view()?;
     let truth = progress::during("judging", |p| {
-        set(&mut judge, &job)?;
-        judge.render(&view, p)
+        set(&mut reference, &job)?;
+        reference.render(&view, p)
     })?;
     let project = Renderer::with_engine(threads, device, Engine::Project)?;
     // The walk on the device that projects, be it one in software.
     let same = DeviceChoice::Named(project.stats().adapter.clone());
     let walk = Renderer::with_device(threads, same)?;
     let mut rows = vec![];
-    for mut renderer in [judge, walk, project] {
+    for mut renderer in [reference, walk, project] {
         set(&mut renderer, &job)?;
         let Stats { engine, adapter, .. } = renderer.stats().clone();
         let name = format!("{engine} on {adapter}");
-        let best = Switches::default();
-        let interpolated = Switches { fragments: Fragments::Interpolated, ..best };
+        let best = ProjectionOptions::default();
+        let interpolated = ProjectionOptions { fragments: Fragments::Interpolated, ..best };
         let mut all: Vec<_> = forms(false, size).into_iter().map(|f| (f, best)).collect();
         if engine == "project" {
             all.extend(forms(true, size).into_iter().map(|f| (f, interpolated)));
         }
         let count = all.len() as f64;
         progress::during("drawing", |p| {
-            for (i, ((form, integral), switches)) in all.into_iter().enumerate() {
+            for (i, ((form, integral), projection)) in all.into_iter().enumerate() {
                 p(i as f64 / count);
-                let variant = Variant { name: form, place: "", switches, integral };
+                let variant = Variant { name: form, place: "", projection, integral };
                 match draw(variant, options.frames, &mut renderer, &view, &truth) {
                     Ok(row) => {
                         let Stats { table_ms, table_bytes, .. } = *renderer.stats();
@@ -111,7 +114,7 @@ pub(super) fn run(options: &Options, threads: usize) -> Result<()> {
 
 fn draw(variant: Variant, frames: u32, renderer: &mut Renderer, view: &View, truth: &Image) -> halite::Result<Row> {
     renderer.set_integral(variant.integral);
-    renderer.set_switches(variant.switches);
+    renderer.set_projection(variant.projection);
     let image = renderer.render(view, &|_| ())?;
     Row::measured(variant, image, truth, frames, renderer, view)
 }
@@ -141,7 +144,7 @@ fn write(options: &Options, job: &Job, rows: &[Line]) -> Result<()> {
         .map(|Line { engine, table_ms, bytes, row }| {
             json!({
                 "form": row.variant.name, "engine": engine, "integral": row.variant.integral,
-                "switches": row.variant.switches, "table_bytes": bytes, "table_ms": table_ms, "max": row.max,
+                "switches": row.variant.projection, "table_bytes": bytes, "table_ms": table_ms, "max": row.max,
                 "rmse": row.rmse, "frame_ms": row.frame_ms,
             })
         })

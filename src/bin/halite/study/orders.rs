@@ -4,14 +4,14 @@ use super::{Options, Row, Variant, check, draw, set, sheet};
 use crate::render::{self, Job};
 use crate::{output, progress};
 use anyhow::{Context, Result};
-use halite::geometry::Geometry;
+use halite::geometry::TetMesh;
 use halite::gpu::DeviceChoice;
 use halite::image::{Backdrop, Image};
-use halite::integral::choice::Choice;
+use halite::integral::options::IntegrationOptions;
 use halite::mesh::faces::Faces;
 use halite::order::check::{self, Verdict};
 use halite::order::mpvo::{Mpvo, Rule, Sequence};
-use halite::project::{Cycles, Order, Switches};
+use halite::project::{Cycles, Order, ProjectionOptions};
 use halite::render::{Engine, Renderer};
 use halite::scene::Scene;
 use halite::view::View;
@@ -59,21 +59,21 @@ pub(super) fn run(options: &Options, threads: usize) -> Result<()> {
     let given = options.request.scene()?;
     options.request.studied(given.as_ref())?;
     let device = options.request.device(given.as_ref());
-    let mut judge = Renderer::with_device(threads, DeviceChoice::Cpu)?;
+    let mut reference = Renderer::with_device(threads, DeviceChoice::Cpu)?;
     let mut renderer = Renderer::with_engine(threads, device, Engine::Project)?;
-    let job = judge.install(|| render::prepare(&options.request, given.clone())?.of_mesh("study"))?;
+    let job = reference.install(|| render::prepare(&options.request, given.clone())?.of_mesh("study"))?;
     let first = given.as_ref().map_or(&options.request.input, |scene: &Scene| &scene.mesh).clone();
-    let mut all = vec![studied(options, &first, &job, &mut judge, &mut renderer)?];
+    let mut all = vec![studied(options, &first, &job, &mut reference, &mut renderer)?];
     drop(job);
     output::print(&table(&all[0]))?;
     for path in &options.also {
         let request = options.request.of(path.clone());
-        let job = judge.install(|| render::prepare(&request, None))?;
+        let job = reference.install(|| render::prepare(&request, None))?;
         if job.grid.is_some() {
             tracing::warn!("{}: passed over, as it is a regular or rectilinear grid", path.display());
             continue;
         }
-        all.push(studied(options, path, &job, &mut judge, &mut renderer)?);
+        all.push(studied(options, path, &job, &mut reference, &mut renderer)?);
         output::print(&table(&all[all.len() - 1]))?;
     }
     output::print(&ratios(&all))?;
@@ -90,22 +90,22 @@ pub(super) fn run(options: &Options, threads: usize) -> Result<()> {
     Ok(())
 }
 
-/// Draws the mesh at `path`, and judges it, in each order.
+/// Draws the mesh at `path`, and checks each order of its cells.
 fn studied(
     options: &Options,
     path: &Path,
     job: &Job,
-    judge: &mut Renderer,
+    reference: &mut Renderer,
     renderer: &mut Renderer,
 ) -> Result<Studied> {
     let (view, _) = job.scene.view()?;
-    let geometry = judge.install(|| {
+    let geometry = reference.install(|| {
         let points = job.tetrahedra.points(job.mesh.points());
-        Geometry::new(&points, &job.tetrahedra, &Faces::new(&points, &job.tetrahedra.corners))
+        TetMesh::new(&points, &job.tetrahedra, &Faces::new(&points, &job.tetrahedra.corners))
     });
     let truth = progress::during("judging", |p| {
-        set(judge, job)?;
-        judge.render(&view, p)
+        set(reference, job)?;
+        reference.render(&view, p)
     })?;
     set(renderer, job)?;
     let (mut mpvo, mut lines, mut ours) = (Mpvo::default(), Vec::new(), Sequence::default());
@@ -113,11 +113,11 @@ fn studied(
         for (i, (name, place, rule, order)) in ORDERS.into_iter().enumerate() {
             p(i as f64 / ORDERS.len() as f64);
             // Cycles are not left to the walk: what is wrong shows.
-            let switches = Switches { order, cycles: Cycles::Cut, ..Switches::default() };
-            let variant = Variant { name, place, switches, integral: Choice::default() };
+            let projection = ProjectionOptions { order, cycles: Cycles::Cut, ..ProjectionOptions::default() };
+            let variant = Variant { name, place, projection, integral: IntegrationOptions::default() };
             match draw(variant, options.frames, renderer, &view, &truth) {
                 Ok(row) => {
-                    let (sequence, verdict) = judge.install(|| judged(&mut mpvo, &geometry, &view, rule));
+                    let (sequence, verdict) = reference.install(|| checked(&mut mpvo, &geometry, &view, rule));
                     lines.push(Line { verdict, row });
                     ours = sequence;
                 }
@@ -137,7 +137,7 @@ fn studied(
 }
 
 /// The sequence by a rule, and what is wrong with it.
-fn judged(mpvo: &mut Mpvo, geometry: &Geometry, view: &View, rule: Rule) -> (Sequence, Verdict) {
+fn checked(mpvo: &mut Mpvo, geometry: &TetMesh, view: &View, rule: Rule) -> (Sequence, Verdict) {
     let sequence = mpvo.sequence(geometry, view, rule);
     let entries: Vec<u32> = sequence.cells.iter().rev().copied().collect();
     let verdict = check::check(geometry, view, &entries);
@@ -148,7 +148,7 @@ impl Studied {
     fn report(&self) -> Value {
         let row = |Line { verdict: v, row }: &Line| {
             json!({
-                "order": row.variant.name, "switches": row.variant.switches, "pairs": v.pairs,
+                "order": row.variant.name, "switches": row.variant.projection, "pairs": v.pairs,
                 "inversions": v.inversions, "overlaps": v.overlaps, "pixels": v.pixels,
                 "wrong_pixels": v.wrong.len(), "max": row.max, "rmse": row.rmse, "order_ms": row.order_ms,
                 "frame_ms": row.frame_ms,

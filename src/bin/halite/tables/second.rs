@@ -67,7 +67,7 @@ fn slabs(exact: &Exact<f64>, count: u32, length: impl Fn(f64) -> f64 + Sync) -> 
     (0..count).into_par_iter().map(slab).collect()
 }
 
-/// A table, judged by what slabs do.
+/// A table, compared with what slabs do.
 fn row(
     name: &'static str,
     construction: String,

@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::integral::Light;
-use crate::integral::choice::Two;
 use crate::integral::floats::LANES;
+use crate::integral::options::Two;
 use crate::integral::second::{Scratch, Segment};
 use crate::transfer::bivariate::{OPEN, Sine, Wave, Widget as Shown};
 use crate::transfer::shading::{Highlight, Light as Lamp, Shade};
@@ -76,7 +76,7 @@ fn functions() -> Vec<(&'static str, TransferFunction)> {
 /// Of cells of all sizes, with sixteen segments in each.
 #[test]
 fn side_by_side_is_one_by_one() {
-    let normal = [Normal { mid: 0.1, half: 0.8 }, Normal { mid: -0.05, half: 1.1 }];
+    let normal = [Normalization { mid: 0.1, half: 0.8 }, Normalization { mid: -0.05, half: 1.1 }];
     for (name, transfer) in functions() {
         let second = Second::new(&transfer, normal, DVec3::ZERO, 1.0, Two::default());
         let wide = second.wide();
@@ -140,7 +140,7 @@ fn side_by_side_is_one_by_one() {
                     Segment::new(&second, &values(0), &values(1), DVec3::ZERO, along, f64::from(length[l])).unwrap();
                 let (mut light, mut scratch) = (Light::none(), Scratch::default());
                 second.add(&segment, &mut scratch, &mut light);
-                let wanted = [light.color[0], light.color[1], light.color[2], 1.0 - light.through];
+                let wanted = [light.color[0], light.color[1], light.color[2], 1.0 - light.transmittance];
                 let got = [color[0][l], color[1][l], color[2][l], alpha[l]];
                 let error = (0..4).map(|c| f64::from((got[c] - wanted[c]).abs())).fold(0.0, f64::max);
                 // Of values that f32 rounds, before and after.

@@ -1,11 +1,11 @@
 //! By how much a table is off between four neighbouring texels: `bound.rs` derives these formulas.
 
-use super::function::{End, Interval};
+use super::function::{End, KnotInterval};
 use std::f64::consts::E;
 
 /// What is known of the segments between four values, two neighbours in front and two behind.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Cell {
+pub(super) struct TexelCell {
     /// What extinction is off and varies by, on average over a segment; and at most, relative to what hides there.
     gap: f64,
     shift: f64,
@@ -31,16 +31,20 @@ pub(super) struct Cell {
 
 /// The cells of segments that have one end in interval `i`, and the other there or in a later one. `sums` are the
 /// integrals of extinction up to each value.
-pub(super) fn row<'a>(intervals: &'a [Interval], sums: &'a [f64], i: usize) -> impl Iterator<Item = Cell> + 'a {
+pub(super) fn row<'a>(
+    intervals: &'a [KnotInterval],
+    sums: &'a [f64],
+    i: usize,
+) -> impl Iterator<Item = TexelCell> + 'a {
     let first = &intervals[i];
-    let none = Cell { hull: [[f64::INFINITY, 0.0]; 4], ends: [first.end; 2], ..Cell::default() };
+    let none = TexelCell { hull: [[f64::INFINITY, 0.0]; 4], ends: [first.end; 2], ..TexelCell::default() };
     let (mut gaps, mut shifts, mut so_far) = (0.0, 0.0, none);
     (i..intervals.len()).map(move |j| {
         let k = &intervals[j];
         (gaps, shifts) = (gaps + k.gap, shifts + k.shift);
         so_far.add(k);
         let apart = (j - i).saturating_sub(1) as f64;
-        let mut cell = Cell { ends: [first.end, k.end], apart, ..so_far };
+        let mut cell = TexelCell { ends: [first.end, k.end], apart, ..so_far };
         (cell.gap, cell.shift) = (cell.gap.min(gaps / apart), cell.shift.min(shifts / apart));
         if i == j {
             // Nothing beyond the interval is seen.
@@ -69,15 +73,15 @@ pub(super) fn row<'a>(intervals: &'a [Interval], sums: &'a [f64], i: usize) -> i
     })
 }
 
-impl Cell {
+impl TexelCell {
     /// The same of weights: a colour goes from 0 to 1 along each segment.
     pub(super) fn of_weights(self) -> Self {
         let [density, ..] = self.hull;
         let hull = [density, [0.0, 1.0], [0.0, 1.0], [0.0, 1.0]];
-        Cell { hull, gap_colour: 0.0, shift_colour: 0.0, weights: true, ..self }
+        TexelCell { hull, gap_colour: 0.0, shift_colour: 0.0, weights: true, ..self }
     }
 
-    fn add(&mut self, k: &Interval) {
+    fn add(&mut self, k: &KnotInterval) {
         let over = |x: f64| if x > 0.0 { x / k.least } else { 0.0 };
         (self.gap, self.shift) = (self.gap.max(k.gap), self.shift.max(k.shift));
         (self.gap_over, self.shift_over) = (self.gap_over.max(over(k.gap)), self.shift_over.max(over(k.shift)));

@@ -4,7 +4,7 @@ use crate::integral::Knots;
 
 /// What is known of the function between two values: `bound.rs` defines gaps and shifts.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Interval {
+pub(super) struct KnotInterval {
     /// Of segments that come here, and whose neighbours reach a texel farther: of extinction, and of colours.
     pub(super) gap: f64,
     pub(super) shift: f64,
@@ -130,7 +130,7 @@ impl Sampled {
         }
     }
 
-    fn interval(&self, i: usize) -> Interval {
+    fn interval(&self, i: usize) -> KnotInterval {
         let own = &self.channels[i];
         let around = &self.channels[i.saturating_sub(1)..(i + 2).min(self.channels.len())];
         let reach = |c: usize| around.iter().fold(NOTHING, |range, of| hull(range, of[c].range));
@@ -151,7 +151,7 @@ impl Sampled {
         };
         let slope = |c: usize| if own[c].within.steps > 0.0 { f64::INFINITY } else { own[c].slope };
         let ([least, most], [low, high]) = (reach(0), own[0].range);
-        Interval {
+        KnotInterval {
             gap: gap(0),
             shift: shift(0),
             gap_colour: colours(gap),
@@ -171,7 +171,7 @@ impl Sampled {
 }
 
 /// What bounds need to know of the `n` intervals between the values of a table.
-pub(super) fn intervals(knots: &Knots<f64>, n: usize) -> Vec<Interval> {
+pub(super) fn intervals(knots: &Knots<f64>, n: usize) -> Vec<KnotInterval> {
     let sampled = Sampled::new(knots, n);
     (0..n).map(|i| sampled.interval(i)).collect()
 }

@@ -333,11 +333,11 @@ impl Parabolas {
 /// Puts colour and opacity behind a sum of such.
 #[inline(always)]
 fn composite<S: Simd>(simd: S, sum: &mut [f32x8<S>; 4], color: [f32x8<S>; 3], alpha: f32x8<S>) {
-    let through = f32x8::splat(simd, 1.0) - sum[3];
+    let transmittance = f32x8::splat(simd, 1.0) - sum[3];
     for k in 0..3 {
-        sum[k] = through.mul_add(color[k], sum[k]);
+        sum[k] = transmittance.mul_add(color[k], sum[k]);
     }
-    sum[3] = through.mul_add(alpha, sum[3]);
+    sum[3] = transmittance.mul_add(alpha, sum[3]);
 }
 
 #[inline(always)]

@@ -2,7 +2,7 @@
 
 use super::*;
 
-const UNIT: [Normal; 4] = [Normal { mid: 0.0, half: 1.0 }; 4];
+const UNIT: [Normalization; 4] = [Normalization { mid: 0.0, half: 1.0 }; 4];
 
 /// Functions whose weights are tabulated: ramps, a peak between texels, steps at and between them, and a stretch without extinction.
 fn all() -> Vec<(&'static str, Exact<f64>)> {

@@ -13,7 +13,7 @@ const MOST_NEAR: usize = 1 << 10;
 
 /// What is wrong with a polyhedron.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Fault {
+pub(super) enum ShellFault {
     /// Its faces do not close a surface.
     Open,
     /// It has no volume.
@@ -22,12 +22,12 @@ pub(super) enum Fault {
 
 /// A frame in which a polyhedron reaches about 1 from the origin in each direction, however flat it is.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Frame {
+pub(super) struct ShellFrame {
     centre: DVec3,
     axes: [DVec3; 3],
 }
 
-impl Frame {
+impl ShellFrame {
     /// The frame of some points; `None` if they lie in a plane.
     pub(super) fn of(points: &[DVec3]) -> Option<Self> {
         let centre = points.iter().sum::<DVec3>() / points.len() as f64;
@@ -45,7 +45,7 @@ impl Frame {
         let height = points.iter().map(|p| (*p - centre).dot(three).abs()).fold(0.0, f64::max);
         let round = f64::EPSILON * points.iter().map(|p| p.abs().max_element()).fold(0.0, f64::max);
         let fits = height.is_finite() && height > 4.0 * round && second.length() > 4.0 * round;
-        fits.then(|| Frame { centre, axes: [one / first.length(), two / second.length(), three / height] })
+        fits.then(|| ShellFrame { centre, axes: [one / first.length(), two / second.length(), three / height] })
     }
 
     /// Where a point is in the frame.
@@ -56,8 +56,8 @@ impl Frame {
 
 /// Orients the triangles of a cell's faces outward. Their corners are numbered by `places`, which the answer does, too;
 /// points that are one have one number there.
-pub(super) fn close(places: &[DVec3], triangles: &[[u32; 3]]) -> Result<Vec<[u32; 3]>, Fault> {
-    let mut fault = Fault::Open;
+pub(super) fn close(places: &[DVec3], triangles: &[[u32; 3]]) -> Result<Vec<[u32; 3]>, ShellFault> {
+    let mut fault = ShellFault::Open;
     let mut weld: Vec<u32> = vec![];
     for try_near in [false, true] {
         if try_near {
@@ -80,8 +80,8 @@ pub(super) fn close(places: &[DVec3], triangles: &[[u32; 3]]) -> Result<Vec<[u32
             });
             match orient(places, complete(places, kept.collect())) {
                 Ok(surface) => return Ok(surface),
-                Err(Fault::Flat) => fault = Fault::Flat,
-                Err(Fault::Open) => {}
+                Err(ShellFault::Flat) => fault = ShellFault::Flat,
+                Err(ShellFault::Open) => {}
             }
         }
     }
@@ -171,10 +171,10 @@ fn complete(places: &[DVec3], mut triangles: Vec<[u32; 3]>) -> Vec<[u32; 3]> {
 }
 
 /// Turns triangles so that they look outward.
-fn orient(places: &[DVec3], mut triangles: Vec<[u32; 3]>) -> Result<Vec<[u32; 3]>, Fault> {
+fn orient(places: &[DVec3], mut triangles: Vec<[u32; 3]>) -> Result<Vec<[u32; 3]>, ShellFault> {
     let edges = edges(&triangles);
     if triangles.len() < 4 || edges.values().any(|t| t.len() % 2 == 1) {
-        return Err(Fault::Open);
+        return Err(ShellFault::Open);
     }
     // Across an edge of two triangles, these go opposite ways.
     let mut flipped: Vec<Option<bool>> = vec![None; triangles.len()];
@@ -230,10 +230,10 @@ fn orient(places: &[DVec3], mut triangles: Vec<[u32; 3]>) -> Result<Vec<[u32; 3]
         }
     }
     if balance.values().any(|b| *b != 0) {
-        return Err(Fault::Open);
+        return Err(ShellFault::Open);
     }
     let whole: f64 = triangles.iter().map(|t| volume(&[at(t)])).sum();
-    if whole.abs() < 1e-12 { Err(Fault::Flat) } else { Ok(triangles) }
+    if whole.abs() < 1e-12 { Err(ShellFault::Flat) } else { Ok(triangles) }
 }
 
 /// The parts that hang together by edges of two triangles.

@@ -9,7 +9,7 @@ use crate::gpu::{DeviceChoice, Gpu};
 use crate::mesh::cells::Tetrahedra;
 use crate::mesh::{Mesh, generate};
 use crate::render::Renderer;
-use crate::traverse::gpu::Frame;
+use crate::traverse::gpu::RayUniforms;
 use crate::view::{Camera, Projection, View};
 use glam::DVec3;
 
@@ -38,7 +38,7 @@ fn only_what_changed_is_handed_over() {
     let first = bytes(&mut renderer);
     assert!(first > 36 * 6 * 512);
     let still = bytes(&mut renderer);
-    assert_eq!(still, size_of::<Frame>() as u64, "a still frame needs its view only");
+    assert_eq!(still, size_of::<RayUniforms>() as u64, "a still frame needs its view only");
     renderer.set_transfer(&random_transfer(&mut random, false));
     let function = bytes(&mut renderer) - still;
     assert!(function > 0 && function < 200_000);

@@ -2,9 +2,9 @@
 
 use super::random::{Random, random_transfer};
 use crate::cell::{Face, Projected};
-use crate::field::{Kind, Normal};
+use crate::field::{Kind, Normalization};
 use crate::gpu::function::{Function, Knot};
-use crate::gpu::rays::twice;
+use crate::gpu::rays::double_single;
 use crate::gpu::testing::{gpu, validated};
 use crate::integral::Light;
 use crate::traverse::gpu::*;
@@ -12,8 +12,8 @@ use wgpu::naga;
 
 const KINDS: [Kind; 3] = [Kind::Scalar, Kind::Pair, Kind::Rgba];
 
-fn arrays(chunks: usize) -> Vec<Array> {
-    ARRAYS.map(|(name, element)| Array { name, element, chunks, shift: 22 }).to_vec()
+fn arrays(chunks: usize) -> Vec<ShaderArray> {
+    ARRAYS.map(|(name, element)| ShaderArray { name, element, chunks, shift: 22 }).to_vec()
 }
 
 #[test]
@@ -22,7 +22,7 @@ fn every_program_is_valid() {
         for (direct, chunks) in [(false, 1), (true, 3)] {
             for association in ["POINT", "CORNER", "CELL"] {
                 for blend in [Blend::Composite, Blend::Maximum] {
-                    validated(&program(&Variant { kind, direct }, association, blend, None, &arrays(chunks)));
+                    validated(&program(&ShaderVariant { kind, direct }, association, blend, None, &arrays(chunks)));
                 }
             }
         }
@@ -32,7 +32,7 @@ fn every_program_is_valid() {
 #[test]
 fn layouts_match_their_rust_twins() {
     use std::mem::offset_of;
-    let variant = Variant { kind: Kind::Scalar, direct: false };
+    let variant = ShaderVariant { kind: Kind::Scalar, direct: false };
     let module = validated(&program(&variant, "POINT", Blend::Composite, None, &arrays(1)));
     let check = |name: &str, size: usize, offsets: &[usize]| {
         let (_, t) = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name)).unwrap();
@@ -50,25 +50,26 @@ fn layouts_match_their_rust_twins() {
     check!("Box", Bounds, low high);
     check!("Knot", Knot, value slope ends);
     check!("Function", Function, opacity color end scale);
-    check!("Counts", RawCounts, steps carry repaired unused);
-    check!("Frame", Frame, origin direction size first_row rows near far planes has_ends leaves faces most_steps most_work);
+    check!("Counts", RawCounts, steps carry retraced unused);
+    check!("RayUniforms", RayUniforms, origin direction size first_row rows near far planes has_ends leaves faces most_steps most_work);
     check("Point", 24, &[0, 8, 16]);
 }
 
 /// Runs a kernel over `cases`, whose bindings are 0 and, for as many results, 1 of group 1.
-fn run<C: Pod, R: Pod>(gpu: &Gpu, source: &str, group_0: &[(Binding, &Buffer)], cases: &[C]) -> Vec<R> {
+fn run<C: Pod, R: Pod>(gpu: &Gpu, source: &str, group_0: &[(Slot, &Buffer)], cases: &[C]) -> Vec<R> {
     let layouts = [
-        shader::group_layout(gpu, &group_0.iter().map(|g| g.0).collect::<Vec<_>>()),
-        shader::group_layout(gpu, &[Binding::Read, Binding::Write]),
+        raster::layout(gpu, Stages::COMPUTE, &group_0.iter().map(|g| g.0).collect::<Vec<_>>()),
+        raster::layout(gpu, Stages::COMPUTE, &[Slot::Read, Slot::Write]),
     ];
-    let pipeline = shader::compile(gpu, "test", source, &[&layouts[0], &layouts[1]]);
+    let layout = raster::pipeline_layout(gpu, &layouts.each_ref().map(Some));
+    let pipeline = raster::compute(gpu, &raster::module(gpu, "test", source), "main", &layout);
     let size = (cases.len() * size_of::<R>()) as u64;
     let cases_buffer = Buffer::holding(gpu, "cases", cases, Usage::STORAGE).unwrap();
     let results = Buffer::new(gpu, "results", size, Usage::STORAGE | Usage::COPY_SRC).unwrap();
     let back = Buffer::new(gpu, "back", size, Usage::COPY_DST | Usage::MAP_READ).unwrap();
     let groups = [
-        shader::group(gpu, &layouts[0], group_0.iter().map(|g| g.1)),
-        shader::group(gpu, &layouts[1], [&cases_buffer, &results]),
+        raster::group_of(gpu, &layouts[0], group_0.iter().map(|g| g.1)),
+        raster::group_of(gpu, &layouts[1], [&cases_buffer, &results]),
     ];
     let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     {
@@ -137,7 +138,7 @@ fn cells_are_walked_as_in_f64() {
             points
         })
         .collect();
-    let variant = Variant { kind: Kind::Scalar, direct: false };
+    let variant = ShaderVariant { kind: Kind::Scalar, direct: false };
     let source = [&shader::prelude(&variant), shader::CELL, CELL_TEST].join("\n");
     let outcomes: Vec<Outcome> = run(&gpu, &source, &[], &cases);
     let mut entered = 0;
@@ -171,7 +172,7 @@ fn areas_are_as_accurate_as_they_are_small() {
             })
         })
         .collect();
-    let variant = Variant { kind: Kind::Scalar, direct: false };
+    let variant = ShaderVariant { kind: Kind::Scalar, direct: false };
     let source = [&shader::prelude(&variant), shader::CELL, CELL_TEST].join("\n");
     let outcomes: Vec<Outcome> = run(&gpu, &source, &[], &cases);
     for (case, outcome) in cases.iter().zip(&outcomes) {
@@ -189,8 +190,8 @@ fn areas_are_as_accurate_as_they_are_small() {
 }
 
 const PLACE_TEST: &str = "
-struct Case { origin: Twice, direction: Twice, point: Twice }
-struct Outcome { place: vec4f, right: vec4f, up: vec4f, sum: Twice }
+struct Case { origin: DoubleSingle, direction: DoubleSingle, point: DoubleSingle }
+struct Outcome { place: vec4f, right: vec4f, up: vec4f, sum: DoubleSingle }
 @group(1) @binding(0) var<storage, read> cases: array<Case>;
 @group(1) @binding(1) var<storage, read_write> outcomes: array<Outcome>;
 @compute @workgroup_size(64)
@@ -221,10 +222,10 @@ fn places_beside_a_ray_are_as_accurate_as_they_are_near() {
             let direction = random.direction() * random.within(0.5, 2.0);
             let aside = random.direction() * 10f64.powf(random.within(-7.0, 0.0));
             [origin, direction, origin + direction * random.within(-2.0, 4.0) + aside]
-                .map(|v| twice(v).map(|[x, y, z]| [x, y, z, 0.0]))
+                .map(|v| double_single(v).map(|[x, y, z]| [x, y, z, 0.0]))
         })
         .collect();
-    let variant = Variant { kind: Kind::Scalar, direct: false };
+    let variant = ShaderVariant { kind: Kind::Scalar, direct: false };
     let source = [&shader::prelude(&variant), shader::CELL, PLACE_TEST].join("\n");
     let outcomes: Vec<PlaceOutcome> = run(&gpu, &source, &[], &cases);
     let whole = |[high, low]: [[f32; 4]; 2]| {
@@ -269,7 +270,7 @@ fn segments_are_integrated_as_in_f64() {
     let mut random = Random(5);
     for (round, kind) in KINDS.into_iter().chain(KINDS).enumerate() {
         let transfer = random_transfer(&mut random, round % 2 == 1);
-        let normal = [Normal { mid: 0.0, half: 1.0 }; 4];
+        let normal = [Normalization { mid: 0.0, half: 1.0 }; 4];
         let (fast, slow) =
             (Exact::<f32>::new(&transfer, kind, &normal, 1.0), Exact::<f64>::new(&transfer, kind, &normal, 1.0));
         let places: Vec<f32> = fast.opacity.s.clone();
@@ -304,11 +305,11 @@ fn segments_are_integrated_as_in_f64() {
             Kind::Pair => "v.xy",
             Kind::Rgba => "v",
         };
-        let variant = Variant { kind, direct: fast.direct };
+        let variant = ShaderVariant { kind, direct: fast.direct };
         let convert = format!("fn value_of(v: vec4f) -> Value {{ return {value}; }}");
         let source = [&shader::prelude(&variant), &convert, shader::INTEGRAL, INTEGRAL_TEST].join("\n");
         let [function, knots, buckets] = function::upload(&gpu, &fast).unwrap();
-        let group = [(Binding::Uniform, &function), (Binding::Read, &knots), (Binding::Read, &buckets)];
+        let group = [(Slot::Uniform, &function), (Slot::Read, &knots), (Slot::Read, &buckets)];
         let outcomes: Vec<[f32; 4]> = run(&gpu, &source, &group, &cases);
         for ([front, back, length], got) in cases.iter().zip(&outcomes) {
             let want = add(&slow, kind, front, back, length[0]);
@@ -331,7 +332,7 @@ fn add(exact: &Exact<f64>, kind: Kind, front: &[f32; 4], back: &[f32; 4], length
         Kind::Pair => exact.add(&[f[0], f[1]], &[b[0], b[1]], l, &mut light),
         Kind::Rgba => exact.add(&f, &b, l, &mut light),
     }
-    [light.color[0], light.color[1], light.color[2], light.through]
+    [light.color[0], light.color[1], light.color[2], light.transmittance]
 }
 
 fn add_fast(exact: &Exact<f32>, kind: Kind, f: &[f32; 4], b: &[f32; 4], length: f32) -> [f32; 4] {
@@ -341,5 +342,5 @@ fn add_fast(exact: &Exact<f32>, kind: Kind, f: &[f32; 4], b: &[f32; 4], length: 
         Kind::Pair => exact.add(&[f[0], f[1]], &[b[0], b[1]], length, &mut light),
         Kind::Rgba => exact.add(f, b, length, &mut light),
     }
-    [light.color[0], light.color[1], light.color[2], light.through]
+    [light.color[0], light.color[1], light.color[2], light.transmittance]
 }

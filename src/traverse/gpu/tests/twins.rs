@@ -4,8 +4,8 @@ use super::draw;
 use super::random::{Random, meshes, plain, random_transfer, random_view};
 use crate::error::Error;
 use crate::field::{Association, Component, Field};
-use crate::gpu::DeviceChoice;
-use crate::gpu::testing::choice;
+use crate::gpu::testing::{bindings, choice};
+use crate::gpu::{DeviceChoice, Part};
 use crate::mesh::cells::Tetrahedra;
 use crate::mesh::{Mesh, generate};
 use crate::render::{Engine, Renderer};
@@ -181,17 +181,19 @@ fn arrays_of_several_bindings_are_one() {
         {
             renderer.set_field(&Field::new(&mesh, array, Some(association), Component::All).unwrap()).unwrap();
             let [one, several] = [u64::MAX, 16 << 10].map(|bytes| {
-                let mut bindings = vec![];
                 if let Some(traverse) = renderer.backend().traverse() {
-                    traverse.bind_at_most(bytes.min(128 << 20));
+                    traverse.gpu_mut().binding = bytes.min(128 << 20);
+                    traverse.invalidate(Part::Mesh);
                 }
                 if let Some(project) = renderer.backend().project() {
-                    project.bind_at_most(bytes.min(128 << 20));
+                    project.gpu_mut().binding = bytes.min(128 << 20);
+                    project.invalidate(Part::Mesh);
                 }
                 let image = draw(&mut renderer, &view);
-                bindings.extend(renderer.backend().traverse().map(|t| t.bindings()));
-                bindings.extend(renderer.backend().project().map(|p| p.bindings()));
-                (image, bindings.concat())
+                let mut all = vec![];
+                all.extend(renderer.backend().traverse().map(|t| bindings(t.chunks())));
+                all.extend(renderer.backend().project().map(|p| bindings(p.chunks())));
+                (image, all.concat())
             });
             assert!(one.1.iter().all(|&n| n == 1) && one.0.pixels.iter().any(|p| p[3] > 0.1), "{:?}", one.1);
             // Cells and points; scalars of cells have room in one.

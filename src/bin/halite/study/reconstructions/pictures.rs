@@ -5,7 +5,7 @@ use anyhow::Result;
 use halite::cast::{Order, Reconstruction, Sampling};
 use halite::gpu::DeviceChoice;
 use halite::image::Image;
-use halite::integral::choice::{Choice, Form, Texels};
+use halite::integral::options::{Form, IntegrationOptions, Texels};
 use halite::integral::table::Kind;
 use halite::render::Renderer;
 use halite::view::View;
@@ -65,13 +65,20 @@ pub(super) fn draw(volumes: &[Volume], threads: usize, frames: u32, report: &dyn
     let mut all = Pictures { pictures: vec![], tables: vec![], voxels: vec![], text: String::new() };
     for (i, volume) in volumes.iter().enumerate() {
         report(i as f64 / volumes.len() as f64);
-        renderer.set_integral(Choice::default());
+        renderer.set_integral(IntegrationOptions::default());
         renderer.set_grid(&volume.grid)?;
         renderer.set_field(&volume.field)?;
         renderer.set_transfer(&volume.scene.transfer);
         let (view, _) = volume.scene.view()?;
-        let truth =
-            reconstructed(&mut renderer, &view, Order::Exact, Sampling::Voxels, Choice::default(), frames, None)?;
+        let truth = reconstructed(
+            &mut renderer,
+            &view,
+            Order::Exact,
+            Sampling::Voxels,
+            IntegrationOptions::default(),
+            frames,
+            None,
+        )?;
         let background = volume.scene.background.unwrap_or_default().map(|c| c as f32);
         let mut studio = Studio { renderer: &mut renderer, view, truth: &truth.image, volume, frames, background };
         studio.by_voxels(&mut all)?;
@@ -89,7 +96,7 @@ fn reconstructed(
     view: &View,
     order: Order,
     sampling: Sampling,
-    choice: Choice,
+    choice: IntegrationOptions,
     frames: u32,
     truth: Option<&Image>,
 ) -> Result<Drawn> {
@@ -119,14 +126,14 @@ struct Studio<'a> {
 }
 
 impl Studio<'_> {
-    fn draw(&mut self, order: Order, sampling: Sampling, choice: Choice) -> Result<Drawn> {
+    fn draw(&mut self, order: Order, sampling: Sampling, choice: IntegrationOptions) -> Result<Drawn> {
         reconstructed(self.renderer, &self.view, order, sampling, choice, self.frames, Some(self.truth))
     }
 
     /// Orders 1 and 2 with samples at the faces of voxels.
     fn by_voxels(&mut self, all: &mut Pictures) -> Result<()> {
-        let first = self.draw(Order::One, Sampling::Voxels, Choice::default())?;
-        let second = self.draw(Order::Two, Sampling::Voxels, Choice::default())?;
+        let first = self.draw(Order::One, Sampling::Voxels, IntegrationOptions::default())?;
+        let second = self.draw(Order::Two, Sampling::Voxels, IntegrationOptions::default())?;
         let ratio = first.rmse / second.rmse;
         if all.voxels.is_empty() {
             all.text += "pictures, samples at faces of voxels      rmse of order 1, of order 2, ratio, ms, ms\n";
@@ -150,7 +157,11 @@ impl Studio<'_> {
     /// Figure 6: what tables take by their steps, and from how many on pictures of bytes are the same.
     fn tables(&mut self, all: &mut Pictures) -> Result<()> {
         let sampling = Sampling::Steps(2.0 * self.volume.samples.width());
-        let choice = |iterations| Choice { iterations, table: Some([TEXELS; 3]), ..Choice::of(Form::SecondOrder) };
+        let choice = |iterations| IntegrationOptions {
+            iterations,
+            table: Some([TEXELS; 3]),
+            ..IntegrationOptions::of(Form::SecondOrder)
+        };
         let mut drawn = vec![];
         for (iterations, theirs) in ITERATIONS {
             drawn.push((iterations, theirs, self.draw(Order::Two, sampling, choice(iterations))?));
@@ -175,7 +186,7 @@ impl Studio<'_> {
         if let Some(iterations) = agree {
             all.text += &format!("  pictures agree within a byte's step from {iterations} steps on\n");
         }
-        let own = self.draw(Order::Two, sampling, Choice::of(Form::SecondOrderPolynomial))?;
+        let own = self.draw(Order::Two, sampling, IntegrationOptions::of(Form::SecondOrderPolynomial))?;
         let seconds = own.table_ms * 1e-3;
         all.text += &format!("  of all lengths, 64^3, degree 2: {seconds:>16.3} s, rmse {:.1e}\n", own.rmse);
         all.tables
@@ -200,19 +211,20 @@ impl Studio<'_> {
             let sampling = Sampling::Steps(voxels * self.volume.samples.width());
             let (number, table, bits) = match order {
                 Order::One => {
-                    let form = Choice {
+                    let form = IntegrationOptions {
                         lengths: Kind::LogNormalised,
                         table: Some([256, 256, 16]),
-                        ..Choice::of(Form::Volume)
+                        ..IntegrationOptions::of(Form::Volume)
                     };
-                    (1, Choice { texels: Texels::Unorm16, ..form }, "16")
+                    (1, IntegrationOptions { texels: Texels::Unorm16, ..form }, "16")
                 }
                 _ => {
-                    let form = Choice { table: Some([TEXELS; 3]), ..Choice::of(Form::SecondOrder) };
-                    (2, Choice { texels: Texels::Unorm8, ..form }, "8")
+                    let form =
+                        IntegrationOptions { table: Some([TEXELS; 3]), ..IntegrationOptions::of(Form::SecondOrder) };
+                    (2, IntegrationOptions { texels: Texels::Unorm8, ..form }, "8")
                 }
             };
-            for (choice, bits) in [(table, bits), (Choice::default(), "none")] {
+            for (choice, bits) in [(table, bits), (IntegrationOptions::default(), "none")] {
                 let drawn = self.draw(*order, sampling, choice)?;
                 let by = if bits == "none" { "integral".to_owned() } else { format!("{bits}-bit table") };
                 let Drawn { max, rmse, frame_ms, table_ms, .. } = drawn;

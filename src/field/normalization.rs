@@ -10,7 +10,7 @@ use crate::transfer::TransferFunction;
 /// An affine map of a field's values: `(s − mid) / half`, computed in f64 so that nothing is lost in a field like
 /// 1e9 ± 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Normal {
+pub struct Normalization {
     /// What becomes 0.
     pub mid: f64,
     /// What is this far above that becomes 1. Positive.
@@ -36,11 +36,11 @@ const ROUNDING: f64 = 1.0 / (1u64 << 24) as f64;
 /// Of ±1, how much a map leaves to knots that move apart in edits, where no table is asked for, which has few texels.
 const ROOM: f64 = 2.0;
 
-impl Normal {
+impl Normalization {
     /// The map of `[lo, hi]` to [−1, 1].
     pub fn new(lo: f64, hi: f64) -> Self {
         let (mid, half) = (lo / 2.0 + hi / 2.0, hi / 2.0 - lo / 2.0);
-        Normal { mid, half: if half > 0.0 { half } else { mid.abs().max(1.0) } }
+        Normalization { mid, half: if half > 0.0 { half } else { mid.abs().max(1.0) } }
     }
 
     /// `(s − mid) / half`.
@@ -61,12 +61,12 @@ impl Normal {
 
 /// What the values of one component must be told apart by.
 #[derive(Debug, Clone, Default)]
-struct Needs {
+struct Resolution {
     /// Places from and to which values may be off by some share of a distance, and this distance.
     needs: Vec<[f64; 3]>,
 }
 
-impl Needs {
+impl Resolution {
     /// Those of functions with knots at these places, ascending, and steps at those that come twice, of a component with
     /// values in `range`, of which `sample` are some. Unless the functions `clamp`, they step at their ends, too.
     fn new(functions: &[Vec<f64>], clamp: bool, [lo, hi]: [f64; 2], sample: &[f64]) -> Self {
@@ -83,7 +83,7 @@ impl Needs {
                 }
             }
         }
-        Needs { needs }
+        Resolution { needs }
     }
 
     /// How far values may be off at most, of the distances that they must be told apart by, if `mid` becomes 0.
@@ -98,7 +98,7 @@ impl Needs {
     }
 
     /// The map that blurs least, and maps all places to ±1/`room`.
-    fn best(&self, room: f64) -> Normal {
+    fn best(&self, room: f64) -> Normalization {
         let [lo, hi] = self.hull();
         // `blur` is the greatest of convex functions, so it has one valley.
         let (mut a, mut b) = (lo, hi);
@@ -120,11 +120,11 @@ impl Needs {
             .filter(|s| (a..=b).contains(s))
             .fold(a / 2.0 + b / 2.0, |best, s| if self.blur(s) <= self.blur(best) { s } else { best });
         let half = (hi - middle).max(middle - lo);
-        Normal { mid: middle, half: if half > 0.0 { half * room } else { 1.0 } }
+        Normalization { mid: middle, half: if half > 0.0 { half * room } else { 1.0 } }
     }
 
     /// Whether all places are within ±1 under `normal`.
-    fn fit(&self, normal: Normal) -> bool {
+    fn fit(&self, normal: Normalization) -> bool {
         let [lo, hi] = self.hull();
         self.needs.is_empty() || (normal.apply(lo) >= -1.0 && normal.apply(hi) <= 1.0)
     }
@@ -147,7 +147,7 @@ pub(crate) struct Chooser {
     range: [[f64; 2]; 4],
     /// Of each component that a function is asked of, some different values, ascending.
     samples: [Vec<f64>; 4],
-    normal: [Normal; 4],
+    normal: [Normalization; 4],
     /// The knots that were last found to be too close.
     close: Option<[f64; 2]>,
 }
@@ -167,7 +167,7 @@ impl Chooser {
     }
 
     /// How components are mapped now.
-    pub(crate) fn normal(&self) -> &[Normal; 4] {
+    pub(crate) fn normal(&self) -> &[Normalization; 4] {
         &self.normal
     }
 
@@ -183,7 +183,7 @@ impl Chooser {
         };
         let mut changed = false;
         for (k, functions) in functions {
-            let needs = Needs::new(&functions, transfer.clamp(), self.range[k], &self.samples[k]);
+            let needs = Resolution::new(&functions, transfer.clamp(), self.range[k], &self.samples[k]);
             let (now, fits) = (needs.blur(self.normal[k].mid), needs.fit(self.normal[k]));
             if fits && now <= SHARP {
                 continue;
@@ -204,8 +204,8 @@ impl Chooser {
         if let Some([a, b]) = close.filter(|_| self.close != close) {
             let [lo, hi] = self.range[last];
             tracing::warn!(
-                "the knots of the opacity function at {a} and {b} are closer than 32-bit floats tell values from {lo} to {hi} \
-                 apart where others are as close elsewhere; between them the picture may be wrong"
+                "the knots of the opacity function at {a} and {b} are too close to each other for 32-bit floats, as values are \
+                 from {lo} to {hi} and other knots are far away; between the two the picture may be wrong"
             );
         }
         self.close = close;
@@ -214,7 +214,7 @@ impl Chooser {
 
 /// Two neighbouring knots within `range` that are closer than values there can be told apart, if the function turns there:
 /// what only rises or falls between them is as good as a step.
-fn too_close(knots: &[(f64, f64)], normal: Normal, [lo, hi]: [f64; 2]) -> Option<[f64; 2]> {
+fn too_close(knots: &[(f64, f64)], normal: Normalization, [lo, hi]: [f64; 2]) -> Option<[f64; 2]> {
     (1..knots.len()).find_map(|i| {
         let [(s0, _), (s1, _)] = [knots[i - 1], knots[i]];
         let off = (s0 - normal.mid).abs().max((s1 - normal.mid).abs()) * ROUNDING;
@@ -231,8 +231,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn needs(places: &[f64]) -> Needs {
-        Needs::new(&[places.to_vec()], true, [-1e30, 1e30], &[0.0, 0.25, 0.5, 0.75, 1.0])
+    fn needs(places: &[f64]) -> Resolution {
+        Resolution::new(&[places.to_vec()], true, [-1e30, 1e30], &[0.0, 0.25, 0.5, 0.75, 1.0])
     }
 
     #[test]
@@ -243,10 +243,10 @@ mod tests {
         let best = peak.best(1.0);
         assert!((best.mid - 0.1).abs() < 1e-7 && peak.fit(best) && peak.blur(best.mid) < 1e-6, "{best:?}");
         let far = needs(&[0.0, 0.25, 0.5, 1e6]);
-        assert!(far.blur(far.best(1.0).mid) < 1e-7 && far.blur(Normal::new(0.0, 1e6).mid) > 1e-2);
+        assert!(far.blur(far.best(1.0).mid) < 1e-7 && far.blur(Normalization::new(0.0, 1e6).mid) > 1e-2);
         // A step says where it is, and is told from the values around it.
         let step = needs(&[0.4, 0.4]);
-        assert_eq!(step.best(1.0), Normal { mid: 0.4, half: 1.0 });
+        assert_eq!(step.best(1.0), Normalization { mid: 0.4, half: 1.0 });
         assert!(step.blur(-1e9) > 1.0);
         // Nothing to tell.
         assert_eq!(needs(&[0.4]).blur(1e30), 0.0);
@@ -254,25 +254,25 @@ mod tests {
 
     #[test]
     fn only_what_turns_is_too_close() {
-        let normal = Normal::new(0.0, 1.0);
+        let normal = Normalization::new(0.0, 1.0);
         let of = |knots: &[(f64, f64)]| too_close(knots, normal, [0.0, 1.0]);
         assert_eq!(of(&[(0.0, 0.0), (0.9, 0.0), (0.9 + 1e-9, 1.0), (1.0, 1.0)]), None);
         let peak = [(0.0, 0.0), (0.9, 0.0), (0.9 + 1e-9, 1.0), (0.9 + 2e-9, 0.0), (1.0, 0.0)];
         assert_eq!(of(&peak), Some([0.9, 0.9 + 1e-9]));
         assert_eq!(too_close(&peak, normal, [0.0, 0.5]), None);
-        assert_eq!(too_close(&peak, Normal { mid: 0.9, half: 1.0 }, [0.0, 1.0]), None);
+        assert_eq!(too_close(&peak, Normalization { mid: 0.9, half: 1.0 }, [0.0, 1.0]), None);
     }
 
     #[test]
     fn what_is_finite_stays_so() {
-        let normal = Normal::new(-1.0, 1.0);
+        let normal = Normalization::new(-1.0, 1.0);
         for s in [1e38, -1e38, f64::MAX, f64::MIN] {
             assert_eq!(normal.bounded(s, MOST), (MOST * s.signum()) as f32);
         }
         for s in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             assert!(!normal.bounded(s, MOST).is_finite());
         }
-        assert_eq!(Normal::new(f64::MIN, f64::MAX).bounded(f64::MAX, MOST), 1.0);
+        assert_eq!(Normalization::new(f64::MIN, f64::MAX).bounded(f64::MAX, MOST), 1.0);
     }
 
     proptest! {

@@ -8,13 +8,13 @@ use serde::{Deserialize, Serialize};
 /// A form of the ray-segment integral and, for tables, what differs between the published ones. The default is exact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
-pub struct Choice {
+pub struct IntegrationOptions {
     /// The form.
     pub form: Form,
     /// What a volume holds, and for which lengths.
     pub lengths: Kind,
     /// Texels: values in front, values behind, and lengths of a volume or planes of a cylinder; those of polynomials
-    /// are their degree's. Values in front and behind are as many but for volumes. Without: [`Choice::size`].
+    /// are their degree's. Values in front and behind are as many but for volumes. Without: [`IntegrationOptions::size`].
     pub table: Option<[u32; 3]>,
     /// Of polynomials, from 1 to 8: Guthe et al. (2002) have 1, 2 and 4. Those of slabs have 4 at most.
     pub degree: u32,
@@ -36,26 +36,26 @@ pub struct Choice {
     pub two: Two,
 }
 
-impl Choice {
-    /// This choice with the form, or the method of two variables, that options and scenes know by `name`.
+impl IntegrationOptions {
+    /// These options with the form, or the method of two variables, that options and scenes know by `name`.
     ///
     /// # Errors
     /// With the names that there are.
     pub fn named(self, name: &str) -> std::result::Result<Self, String> {
         if let Some((_, form)) = Form::ALL.into_iter().find(|f| f.0 == name) {
-            return Ok(Choice { form, ..self });
+            return Ok(IntegrationOptions { form, ..self });
         }
         if let Some((_, method)) = Method::ALL.into_iter().find(|m| m.0 == name) {
-            return Ok(Choice { two: Two { method, ..self.two }, ..self });
+            return Ok(IntegrationOptions { two: Two { method, ..self.two }, ..self });
         }
         let known: Vec<&str> = Form::ALL.iter().map(|f| f.0).chain(Method::ALL.iter().map(|m| m.0)).collect();
         Err(format!("\"{name}\" is not known here; there is {}", known.join(", ")))
     }
 }
 
-impl Default for Choice {
+impl Default for IntegrationOptions {
     fn default() -> Self {
-        Choice {
+        IntegrationOptions {
             form: Form::default(),
             lengths: Kind::default(),
             table: None,
@@ -76,7 +76,7 @@ impl Default for Choice {
 #[serde(rename_all = "kebab-case")]
 pub enum Form {
     /// The exact integral, or a table where functions have so many knots that a look-up is faster:
-    /// [`Choice::resolved`].
+    /// [`IntegrationOptions::resolved`].
     Auto,
     /// The exact integral.
     #[default]
@@ -285,10 +285,10 @@ pub const MOST_ITERATIONS: u32 = 65_536;
 /// Bytes of a table at most.
 const MOST_BYTES: u64 = 1 << 30;
 
-impl Choice {
+impl IntegrationOptions {
     /// This form with everything else as it is by default.
     pub fn of(form: Form) -> Self {
-        Choice { form, ..Choice::default() }
+        IntegrationOptions { form, ..IntegrationOptions::default() }
     }
 
     /// [`Form::Auto`] decided; other forms stay. `knots` is the number of knots that the values in the mean cell span,
@@ -302,7 +302,7 @@ impl Choice {
             return self;
         }
         let form = if knots > FEW_KNOTS && all <= 512 { Form::Polynomial } else { Form::Exact };
-        Choice { form, ..self }
+        IntegrationOptions { form, ..self }
     }
 
     /// Texels along each axis, for a function of so many knots; the last is that of lengths, coefficients or planes.
@@ -384,7 +384,7 @@ impl Choice {
             }
             _ => None,
         };
-        let bytes = Choice::bytes(size);
+        let bytes = IntegrationOptions::bytes(size);
         let wrong = wrong.or_else(|| {
             (bytes > MOST_BYTES)
                 .then(|| format!("a table of {size:?} texels takes {bytes} bytes, and {MOST_BYTES} at most"))
@@ -396,7 +396,7 @@ impl Choice {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::field::{self, Normal};
+    use crate::field::{self, Normalization};
     use crate::transfer::{Emission, TransferFunction};
 
     #[test]
@@ -404,7 +404,7 @@ mod tests {
         let exact = |emission, extinction| {
             let transfer = TransferFunction::new(vec![(0.0, [0.5; 3])], vec![(-1.0, 0.0), (1.0, extinction)], 1.0);
             let transfer = transfer.unwrap().with_emission(emission).unwrap();
-            Exact::new(&transfer, field::Kind::Scalar, &[Normal { mid: 0.0, half: 1.0 }; 4], 1.0)
+            Exact::new(&transfer, field::Kind::Scalar, &[Normalization { mid: 0.0, half: 1.0 }; 4], 1.0)
         };
         let direct = Emission::Direct { scale: 1.0 };
         for (form, lengths, refused) in [
@@ -414,46 +414,50 @@ mod tests {
             (Form::Cylindrical, Kind::LogNormalised, false),
             (Form::Exact, Kind::LogNormalised, false),
         ] {
-            let choice = Choice { lengths, ..Choice::of(form) };
-            assert_eq!(choice.check_function(&exact(direct, 1e6)).is_err(), refused, "{form:?}, {lengths:?}");
-            assert!(choice.check_function(&exact(direct, 10.0)).is_ok(), "{form:?}, {lengths:?}");
-            assert!(choice.check_function(&exact(Emission::Chromatic, 1e6)).is_ok(), "{form:?}, {lengths:?}");
+            let options = IntegrationOptions { lengths, ..IntegrationOptions::of(form) };
+            assert_eq!(options.check_function(&exact(direct, 1e6)).is_err(), refused, "{form:?}, {lengths:?}");
+            assert!(options.check_function(&exact(direct, 10.0)).is_ok(), "{form:?}, {lengths:?}");
+            assert!(options.check_function(&exact(Emission::Chromatic, 1e6)).is_ok(), "{form:?}, {lengths:?}");
         }
     }
 
     #[test]
     fn auto_is_exact_while_knots_are_few() {
-        let form = |knots, all| Choice::of(Form::Auto).resolved(knots, all).form;
+        let form = |knots, all| IntegrationOptions::of(Form::Auto).resolved(knots, all).form;
         assert_eq!(form(0.3, 4), Form::Exact);
         assert_eq!(form(FEW_KNOTS, 254), Form::Exact);
         assert_eq!(form(FEW_KNOTS + 0.1, 254), Form::Polynomial);
         // No table resolves so many.
         assert_eq!(form(900.0, 5000), Form::Exact);
-        assert_eq!(Choice::of(Form::Volume).resolved(0.0, 1).form, Form::Volume);
+        assert_eq!(IntegrationOptions::of(Form::Volume).resolved(0.0, 1).form, Form::Volume);
     }
 
     #[test]
     fn sizes_follow_the_function() {
-        assert_eq!(Choice::of(Form::Polynomial).size(10), [512, 512, 3]);
-        assert_eq!(Choice { degree: 4, ..Choice::of(Form::Polynomial) }.size(500), [1024, 1024, 5]);
-        assert_eq!(Choice::of(Form::Volume).size(200), [512, 512, 16]);
-        assert_eq!(Choice::of(Form::Cylindrical).size(3), [256; 3]);
-        let own = Choice { table: Some([8, 9, 10]), ..Choice::of(Form::Volume) };
+        assert_eq!(IntegrationOptions::of(Form::Polynomial).size(10), [512, 512, 3]);
+        assert_eq!(
+            IntegrationOptions { degree: 4, ..IntegrationOptions::of(Form::Polynomial) }.size(500),
+            [1024, 1024, 5]
+        );
+        assert_eq!(IntegrationOptions::of(Form::Volume).size(200), [512, 512, 16]);
+        assert_eq!(IntegrationOptions::of(Form::Cylindrical).size(3), [256; 3]);
+        let own = IntegrationOptions { table: Some([8, 9, 10]), ..IntegrationOptions::of(Form::Volume) };
         assert_eq!(own.size(200), [8, 9, 10]);
-        assert_eq!(Choice::of(Form::SecondOrder).size(3), [256; 3]);
-        let small = Choice { table: Some([32, 32, 0]), ..Choice::of(Form::SecondOrderPolynomial) };
+        assert_eq!(IntegrationOptions::of(Form::SecondOrder).size(3), [256; 3]);
+        let small =
+            IntegrationOptions { table: Some([32, 32, 0]), ..IntegrationOptions::of(Form::SecondOrderPolynomial) };
         assert_eq!(small.size(3), [32; 3]);
         for (_, form) in Form::ALL {
-            let choice = Choice::of(form);
-            choice.check(choice.size(1_000_000)).unwrap();
+            let options = IntegrationOptions::of(form);
+            options.check(options.size(1_000_000)).unwrap();
         }
     }
 
     #[test]
     fn what_is_no_table_is_refused() {
         let refused = |form, table, degree, part: &str| {
-            let choice = Choice { table: Some(table), degree, ..Choice::of(form) };
-            let message = choice.check(choice.size(4)).unwrap_err().to_string();
+            let options = IntegrationOptions { table: Some(table), degree, ..IntegrationOptions::of(form) };
+            let message = options.check(options.size(4)).unwrap_err().to_string();
             assert!(message.contains(part) && message.contains("exact"), "{message}");
         };
         refused(Form::Volume, [1, 2, 3], 2, "at least 2, 2 and 3");
@@ -469,8 +473,8 @@ mod tests {
         refused(Form::SecondOrderPolynomial, [256, 256, 256], 2, "at most 128");
         refused(Form::SecondOrderPolynomial, [8, 8, 8], 5, "from 1 to 4");
         for iterations in [0, MOST_ITERATIONS + 1] {
-            let choice = Choice { iterations, ..Choice::of(Form::SecondOrder) };
-            assert!(choice.check([8; 3]).unwrap_err().to_string().contains("65536 steps"));
+            let options = IntegrationOptions { iterations, ..IntegrationOptions::of(Form::SecondOrder) };
+            assert!(options.check([8; 3]).unwrap_err().to_string().contains("65536 steps"));
         }
         for pieces in [0, MOST_PIECES + 1] {
             assert!(Two { pieces, ..Two::default() }.check().unwrap_err().to_string().contains("1 to 10000 pieces"));
