@@ -9,6 +9,7 @@ mod common;
 
 use common::draw::{self, FIELDS, LOOKS, MESHES, Random, SIZE, VIEWS};
 use common::{ENGINES, Engine, Report, rounds};
+use halite::transfer::TransferFunction;
 
 /// Draws the mesh of this name with every look.
 fn check(name: &str) {
@@ -73,4 +74,39 @@ fn the_scenes_are_worth_drawing() {
         seen += covered;
     }
     assert!(seen > VIEWS.len() * (SIZE[0] * SIZE[1]) as usize / 3, "{seen} pixels");
+}
+
+/// Colour maps of 256 entries, of which a cell has many: smooth, of any colours, and of bands. Lines along which extinction is one line
+/// are integrated at once where little is absorbed.
+#[test]
+fn colour_maps_of_many_entries_are_drawn() {
+    let mut report = Report::default();
+    for (kind, steps) in [("smooth", false), ("any", false), ("bands", true)] {
+        for (m, peak) in [(0, 0.3), (1, 3.0), (4, 0.3), (0, 30.0)] {
+            let case = format!("{}, {kind}, {peak}", MESHES[m].0);
+            let mut random = Random::of(&case);
+            let mut scene = draw::scene(&MESHES[m].1(), &FIELDS[0], &LOOKS[0], &mut random);
+            let [low, high] = scene.field.range(0);
+            let mut color = vec![];
+            for i in 0..256 {
+                let u = f64::from(i) / 255.0;
+                let entry = if kind == "any" {
+                    [(); 3].map(|()| random.within(0.0, 1.0))
+                } else {
+                    [0.0, 2.0, 4.0].map(|k| 0.5 + 0.5 * (7.0 * u + k).sin())
+                };
+                color.push((low + (high - low) * u, entry));
+                if steps {
+                    color.push((low + (high - low) * (u + 1.0 / 255.0), entry));
+                }
+            }
+            scene.transfer = TransferFunction::new(color, vec![(low, 0.0), (high, peak)], 0.7).unwrap();
+            let view = VIEWS[m % 2].1(&mut random);
+            let expected = Engine::Reference.image(&scene, &view);
+            for engine in ENGINES {
+                report.hold(&format!("{engine:?}, {case}"), &engine.image(&scene, &view), &expected, 1e-5);
+            }
+        }
+    }
+    report.finish("colour maps");
 }

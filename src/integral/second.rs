@@ -328,7 +328,10 @@ impl Second {
         if let Some(p) = self.published {
             let normal = (segment.vector + segment.turn * 0.5).normalize_or_zero();
             let share = (1.0 - normal.dot(segment.along).abs()).max(0.0).powf(p);
-            own = Gathered { color: own.color.map(|c| c * share), transmittance: 1.0 - (1.0 - own.transmittance) * share };
+            own = Gathered {
+                color: own.color.map(|c| c * share),
+                transmittance: 1.0 - (1.0 - own.transmittance) * share,
+            };
         }
         light.add(own.color.map(|c| c as f32), (1.0 - own.transmittance) as f32);
     }

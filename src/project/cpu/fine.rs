@@ -12,7 +12,7 @@ use super::second::Kept;
 use super::setup::{Look, Record, Records, Scene};
 use crate::integral::{Batch, Integral, Light};
 use crate::order::crossings::{Crossings, pixel_at, place};
-use crate::order::screen::{NEAREST, ASIDE, TILE};
+use crate::order::screen::{ASIDE, NEAREST, TILE};
 use crate::traverse::cpu::least_transmittance;
 use crate::view::{Blend, View};
 use fearless_simd::Simd;
@@ -279,8 +279,7 @@ impl<const N: usize> Canvas<N> {
                 if !self.lives(at) {
                     continue;
                 }
-                let (column, row) =
-                    (f64::from(self.corner[0] + i) + ASIDE.x, f64::from(self.corner[1] + j) + ASIDE.y);
+                let (column, row) = (f64::from(self.corner[0] + i) + ASIDE.x, f64::from(self.corner[1] + j) + ASIDE.y);
                 let Some([mut enter, mut leave]) = cell.depths(column, row) else { continue };
                 let key = |w: f64| lens.key(w) as f32;
                 let (key_in, key_out) = (key(enter), key(leave));

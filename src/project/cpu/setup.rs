@@ -20,7 +20,7 @@ use super::runs::Runs;
 use crate::geometry::{Cell, TetMesh, Values};
 use crate::integral::Exact;
 use crate::memory::prefetch;
-use crate::order::screen::{Lens, NEAREST, ASIDE, PixelBox, TILE};
+use crate::order::screen::{ASIDE, Lens, NEAREST, PixelBox, TILE};
 use crate::view::Blend;
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x8, f64x8, i32x8, u8x16};
