@@ -2,6 +2,7 @@
 #include "Functions.h"
 
 #include "vtkColorTransferFunction.h"
+#include "vtkDiscretizableColorTransferFunction.h"
 #include "vtkPiecewiseFunction.h"
 #include "vtkVariant.h"
 #include "vtkVolumeProperty.h"
@@ -195,6 +196,36 @@ Functions::Color CategoriesOf(vtkColorTransferFunction* function)
 namespace Functions
 {
 
+// The most colours of a table whose steps are knots.
+const vtkIdType MostColors = 4096;
+
+// The steps of a function that has a table of colours, as ParaView's have; nothing of others. Looked for by halving, each would be a
+// steep ramp between many knots.
+Color StepsOf(vtkColorTransferFunction* function)
+{
+  auto* table = vtkDiscretizableColorTransferFunction::SafeDownCast(function);
+  Color color;
+  if (!table || !table->GetDiscretize() || table->GetIndexedLookup() || table->GetUseLogScale())
+  {
+    return color;
+  }
+  const double* range = table->GetRange();
+  const double low = range[0], width = range[1] - range[0];
+  const vtkIdType count = table->GetNumberOfValues();
+  if (!(width > 0) || count < 1 || count > MostColors)
+  {
+    return color;
+  }
+  for (vtkIdType i = 0; i < count; ++i)
+  {
+    Value v;
+    function->GetColor(low + width * (i + 0.5) / count, v.data());
+    color.push_back({ low + width * i / count, v });
+    color.push_back({ low + width * (i + 1) / count, v });
+  }
+  return color;
+}
+
 Color KnotsOf(vtkColorTransferFunction* function)
 {
   if (function->GetIndexedLookup())
@@ -204,6 +235,11 @@ Color KnotsOf(vtkColorTransferFunction* function)
     {
       return categories;
     }
+  }
+  const Color steps = StepsOf(function);
+  if (!steps.empty())
+  {
+    return steps;
   }
   std::vector<double> nodes;
   for (int i = 0; i < function->GetSize(); ++i)
