@@ -212,7 +212,7 @@ Color StepsOf(vtkColorTransferFunction* function)
   const double* range = table->GetRange();
   const double low = range[0], width = range[1] - range[0];
   const vtkIdType count = table->GetNumberOfValues();
-  if (!(width > 0) || count < 1 || count > MostColors)
+  if (!(width > 0) || !std::isfinite(width) || count < 1 || count > MostColors)
   {
     return color;
   }
