@@ -6,11 +6,18 @@ from typing import Any, Final, Optional, Union, final
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Error", "Mesh", "Renderer", "TransferFunction", "View", "__version__", "automatic", "colormap", "encode"]
+__all__ = ["Error", "LateError", "Mesh", "Renderer", "TransferFunction", "View", "__version__", "automatic", "colormap", "encode"]
 
 __version__: Final[str]
 
 class Error(Exception): ...
+
+@final
+class LateError:
+    def __init__(self) -> None: ...
+    def hold(self, error: BaseException) -> None: ...
+    def take(self) -> Optional[BaseException]: ...
+    def __call__(self, *arguments: Any) -> None: ...
 
 _Given = Sequence[tuple[str, npt.NDArray[Any]]]
 _Named = tuple[str, Optional[npt.NDArray[Any]]]

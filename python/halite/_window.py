@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
+import threading
 from collections.abc import Iterator
 from typing import Any, Optional
 
@@ -13,6 +14,8 @@ import numpy.typing as npt
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkFloatArray, vtkWeakReference
 from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLFramebufferObject, vtkOpenGLQuadHelper, vtkTextureObject
+
+from ._halite import LateError
 
 _FLOAT = 10
 _VERTEX = """//VTK::System::Dec
@@ -37,6 +40,11 @@ class Frames:
         self._window.Set(window)
         self._depth = 0
         self._error: Optional[BaseException] = None
+        self._late = LateError()
+        self._is_new = False
+        self._interactor = vtkWeakReference()
+        # After all that others do at the end of a frame.
+        window.AddObserver("EndEvent", self._late, -1.0)
 
     @classmethod
     def of(cls, window: Any) -> Frames:
@@ -69,11 +77,32 @@ class Frames:
             raise error
 
     def failed(self, error: BaseException, is_new: bool) -> None:
-        """Raises what happened in this frame at its end; where VTK itself asked for the frame, it is shown, once if it is the same."""
+        """Raises what happened in this frame where Python asked for it; while a user drags it is shown, once if it is the same."""
         if self._depth:
             self._error = self._error or error
+        elif threading.current_thread() is threading.main_thread():
+            self._late.hold(error)
+            self._is_new = is_new
+            self._watch_interactor()
         elif is_new:
-            sys.excepthook(type(error), error, error.__traceback__)
+            _show(error)
+
+    def _watch_interactor(self) -> None:
+        window: Any = self._window.Get()
+        interactor = window.GetInteractor()
+        if interactor is not None and self._interactor.Get() is not interactor:
+            self._interactor.Set(interactor)
+            interactor.AddObserver("RenderEvent", self._interactor_drew)
+
+    def _interactor_drew(self, *_: Any) -> None:
+        """The frame was asked for by nobody who could catch what it raises."""
+        error = self._late.take()
+        if error is not None and self._is_new:
+            _show(error)
+
+
+def _show(error: BaseException) -> None:
+    sys.excepthook(type(error), error, error.__traceback__)
 
 
 def rows(matrix: Any) -> npt.NDArray[np.float64]:

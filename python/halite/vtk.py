@@ -13,8 +13,9 @@ camera and the depths of that moment and composited. So opaque geometry may stan
 
 What it cannot do: translucent geometry goes under the volume; several volumes go over each other in the order in which they were
 added to the renderer; VTK's ambient occlusion (SSAO) is refused with an error; exporters leave the volume out, and say nothing; and
-windows have 8 bits for each colour. What goes wrong in a frame is raised by the window's ``Render`` that asked for it; where VTK asked
-itself, while a user drags or for a tiled screenshot, it goes to ``sys.excepthook``, and the window lives on.
+windows have 8 bits for each colour. What goes wrong in a frame is raised by the call that asked for it, such as the ``Render`` of a
+window or the ``Update`` of a vtkWindowToImageFilter; while a user drags, nobody could catch it, and it goes to ``sys.excepthook``. The
+window lives on.
 """
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 //! Halite for Python: what the package `halite` in `python/halite` is made of. Its modules have the documentation.
 
+mod late;
 mod mesh;
 mod renderer;
 mod transfer;
@@ -24,6 +25,7 @@ fn raised(error: halite::Error) -> PyErr {
 fn _halite(py: Python<'_>, module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("Error", py.get_type::<Error>())?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<late::LateError>()?;
     module.add_class::<mesh::Mesh>()?;
     module.add_class::<renderer::Renderer>()?;
     module.add_class::<transfer::TransferFunction>()?;

@@ -4,6 +4,7 @@ import gc
 import os
 import subprocess
 import sys
+import threading
 import tracemalloc
 import weakref
 
@@ -14,6 +15,7 @@ pytest.importorskip("vtkmodules")
 
 from vtkmodules import vtkCommonCore, vtkCommonDataModel, vtkRenderingCore  # noqa: E402
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy  # noqa: E402
+from vtkmodules.vtkRenderingUI import vtkGenericRenderWindowInteractor  # noqa: E402
 
 import halite  # noqa: E402
 import halite.vtk  # noqa: E402
@@ -169,21 +171,42 @@ def test_errors_are_raised_and_survived(fog, monkeypatch):
         with pytest.raises(halite.Error, match='"nothing"') as raised:
             w.Render()
         assert v.error is raised.value
-    # Where VTK asks for frames by itself, nobody can catch it: it is shown, once.
+    # Where VTK asks for the frame, whoever called VTK gets it; tiles are several frames.
     shown = []
     monkeypatch.setattr(sys, "excepthook", lambda kind, error, trace: shown.append(error))
     shot = vtkRenderingCore.vtkWindowToImageFilter()
     shot.SetInput(w)
     shot.ShouldRerenderOn()
-    shot.Update()
+    for scale in (1, 1, 2):
+        shot.SetScale(scale)
+        shot.Modified()
+        with pytest.raises(halite.Error, match='"nothing"') as raised:
+            shot.Update()
+    assert not shown and str(v.error) == str(raised.value)
+    # Others' observers at the end of a frame see nothing of it.
+    ends = []
+    observer = w.AddObserver("EndEvent", lambda *_: [ends.append(i) for i in range(3)])
     shot.Modified()
-    shot.Update()
-    assert not shown, "the user knows this one"
+    with pytest.raises(halite.Error, match='"nothing"'):
+        shot.Update()
+    w.RemoveObserver(observer)
+    assert len(ends) == 12 and not shown
+    # While a user drags, nobody could catch it: it is shown, once.
+    interactor = vtkGenericRenderWindowInteractor()
+    interactor.SetRenderWindow(w)
+    interactor.Initialize()
     v.scalars = "other"
     for _ in range(3):
-        shot.Modified()
-        shot.Update()
+        interactor.Render()
     assert len(shown) == 1 and '"other"' in str(shown[0])
+    # From another thread too.
+    shot.SetScale(1)
+    v.scalars = "third"
+    shot.Modified()
+    thread = threading.Thread(target=shot.Update)
+    thread.start()
+    thread.join()
+    assert len(shown) == 2 and '"third"' in str(shown[1])
     v.scalars = "s"
     assert (pixels(w) == good).all() and v.error is None
     # Ctrl-C while a frame is drawn.
