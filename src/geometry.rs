@@ -6,6 +6,7 @@
 pub mod boundary;
 pub mod contacts;
 
+use crate::buckets::Buckets;
 use crate::error::{Error, Result};
 use crate::field::normalization::{self, Normalization};
 use crate::field::{Association, Field};
@@ -58,14 +59,15 @@ impl TetMesh {
     /// Prepares `tetrahedra`, whose corners index into `points`: see [`Tetrahedra::points`].
     pub fn new(points: &[DVec3], tetrahedra: &Tetrahedra, faces: &Faces) -> Self {
         let corners = &tetrahedra.corners;
-        let [low, high] = bounds(points, corners);
-        let (centre, scale) = normalisation(low, high);
-        let normalised = |p: u32| (points[p as usize] - centre) * scale;
-
         let weld = |p: u32| faces.weld.as_ref().map_or(p, |w| w[p as usize]);
         let mut used = vec![false; points.len()];
         corners.iter().flatten().for_each(|&p| used[weld(p) as usize] = true);
         let used: Vec<u32> = (0..points.len() as u32).filter(|&p| used[p as usize]).collect();
+        let (centre, scale) = match bounds(used.par_iter().map(|&p| points[p as usize])) {
+            [low, high] if low.x <= high.x => normalisation(low, high),
+            _ => normalisation(DVec3::ZERO, DVec3::ZERO),
+        };
+        let normalised = |p: u32| (points[p as usize] - centre) * scale;
         let point_of = along_curve(&used, normalised);
         let mut new_point = vec![0; points.len()];
         point_of.iter().enumerate().for_each(|(new, &old)| new_point[old as usize] = new as u32);
@@ -154,12 +156,7 @@ impl TetMesh {
     /// Moves the points: `points` are as many as before, in world coordinates. Cells keep their neighbours, so none may
     /// turn inside out, and points that shared a position still must.
     pub fn set_points(&mut self, points: &[DVec3]) {
-        let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
-        let [low, high] = self
-            .point_of
-            .par_iter()
-            .fold(|| none, |[l, h], &p| [l.min(points[p as usize]), h.max(points[p as usize])])
-            .reduce(|| none, |a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+        let [low, high] = bounds(self.point_of.par_iter().map(|&p| points[p as usize]));
         if low.x <= high.x {
             (self.centre, self.scale) = normalisation(low, high);
         }
@@ -339,21 +336,41 @@ fn normalisation(low: DVec3, high: DVec3) -> (DVec3, f64) {
     (centre, scale)
 }
 
-/// Smallest and largest coordinates of the points that `corners` name; zero if there are none.
-fn bounds(points: &[DVec3], corners: &[[u32; 4]]) -> [DVec3; 2] {
+/// Smallest and largest coordinates of points: infinite and the wrong way round if there are none.
+fn bounds(points: impl IndexedParallelIterator<Item = DVec3>) -> [DVec3; 2] {
     let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
-    let [low, high] = corners
-        .par_iter()
-        .fold(|| none, |b, c| c.iter().fold(b, |[l, h], &p| [l.min(points[p as usize]), h.max(points[p as usize])]))
-        .reduce(|| none, |a, b| [a[0].min(b[0]), a[1].max(b[1])]);
-    if low.x <= high.x { [low, high] } else { [DVec3::ZERO; 2] }
+    points.fold(|| none, |[l, h], p| [l.min(p), h.max(p)]).reduce(|| none, |a, b| [a[0].min(b[0]), a[1].max(b[1])])
 }
+
+/// Bits of a place on the Morton curve by which items are dealt into buckets.
+const BUCKET_BITS: u32 = 11;
+
+/// Items that are sorted on several threads.
+const LARGE: usize = 1 << 17;
 
 /// `items` ordered along the Morton curve through their places in [−1, 1]³; equal places keep their order.
 fn along_curve(items: &[u32], place: impl Fn(u32) -> DVec3 + Sync) -> Vec<u32> {
-    let mut keyed: Vec<(u64, u32)> = items.par_iter().map(|&i| (morton(place(i)), i)).collect();
-    keyed.par_sort_unstable();
-    keyed.into_par_iter().map(|(_, i)| i).collect()
+    // A number has the first bits of an item's place on the curve, and the item's index: half of what both would take is sorted.
+    let index_bits = usize::BITS - items.len().leading_zeros();
+    let start = |key: u64| key >> index_bits;
+    let item = |key: u64| items[(key & ((1 << index_bits) - 1)) as usize];
+    let key = |(n, &i): (usize, &u32)| (morton(place(i)) << 1) >> index_bits << index_bits | n as u64;
+    let keys: Vec<u64> = items.par_iter().enumerate().map(key).collect();
+    let buckets =
+        Buckets::new(items.len(), 1 << BUCKET_BITS, |n| [Some((keys[n as usize] >> (64 - BUCKET_BITS)) as usize)]);
+    let sorted = |b: usize| {
+        let mut keys: Vec<u64> = buckets.items(b).map(|n| keys[n as usize]).collect();
+        if keys.len() < LARGE {
+            keys.sort_unstable()
+        } else {
+            keys.par_sort_unstable()
+        };
+        // Items so near to each other that the first bits are alike.
+        let alike = keys.chunk_by_mut(|a, b| start(*a) == start(*b)).filter(|same| same.len() > 1);
+        alike.for_each(|same| same.sort_by_cached_key(|&key| morton(place(item(key)))));
+        keys.into_iter().map(item).collect::<Vec<u32>>()
+    };
+    (0..buckets.len()).into_par_iter().map(sorted).collect::<Vec<_>>().concat()
 }
 
 /// The index of `p`, in [−1, 1]³, on the Morton curve of 2²¹ steps per axis.

@@ -33,6 +33,7 @@
 //! feature `ffi` it opens to C++. [`scene`] describes a picture in a JSON file, and
 //! [`mod@reference`] is the slow float64 renderer that the tests compare the engines with.
 
+mod buckets;
 pub mod cast;
 pub mod cell;
 pub mod engine;

@@ -5,8 +5,12 @@
 //! Floating-Point Arithmetic and Fast Robust Geometric Predicates, 1997), so along any chain of neighbours the
 //! orientation is coherent. Tetrahedra whose volume is exactly zero take the orientation that their neighbours demand.
 
+mod groups;
+
+use crate::buckets::Buckets;
 use crate::progress::{Progress, Report};
 use glam::DVec3;
+use groups::{Groups, SidedFace};
 use rayon::prelude::*;
 use robust::Coord3D;
 use std::collections::BTreeSet;
@@ -43,7 +47,7 @@ pub struct Faces {
 }
 
 /// One tetrahedron's view of a face.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct HalfFace {
     /// Four times the tetrahedron plus the opposite corner.
     face: u32,
@@ -100,15 +104,7 @@ impl Faces {
         }
         report(0.95);
         let neighbours: Vec<[u32; 4]> = neighbours.into_iter().map(|n| n.map(AtomicU32::into_inner)).collect();
-        let boundary = (0..corners.len())
-            .into_par_iter()
-            .filter(|&t| orientation[t] != 0)
-            .flat_map_iter(|t| {
-                let beyond = neighbours[t];
-                let open = move |k: &u8| beyond[*k as usize] == BOUNDARY;
-                (0..4u8).filter(open).map(move |k| (t as u32, k))
-            })
-            .collect();
+        let boundary = boundary(&neighbours, &orientation);
         report(1.0);
         Faces {
             boundary,
@@ -160,6 +156,42 @@ impl Faces {
         }
         count
     }
+}
+
+/// Sorted points of a face, and its [`HalfFace::parity`].
+fn ascending(mut points: [u32; 3]) -> ([u32; 3], i8) {
+    let mut parity = 1;
+    for (i, j) in [(0, 1), (1, 2), (0, 1)] {
+        if points[i] > points[j] {
+            points.swap(i, j);
+            parity = -parity;
+        }
+    }
+    (points, parity)
+}
+
+/// Makes the tetrahedra of two faces neighbours.
+fn link(neighbours: &[[AtomicU32; 4]], a: HalfFace, b: HalfFace) {
+    for (from, to) in [(a, b), (b, a)] {
+        neighbours[from.tetrahedron()][from.face as usize % 4].store(to.face / 4, Relaxed);
+    }
+}
+
+/// The faces without a neighbour, ascending, of tetrahedra that have an orientation.
+fn boundary(neighbours: &[[u32; 4]], orientation: &[i8]) -> Vec<(u32, u8)> {
+    const CHUNK: usize = 1 << 14;
+    let chunks: Vec<Vec<(u32, u8)>> = neighbours
+        .par_chunks(CHUNK)
+        .enumerate()
+        .map(|(i, chunk)| {
+            let mut open = Vec::new();
+            for (t, beyond) in (i * CHUNK..).zip(chunk).filter(|&(t, _)| orientation[t] != 0) {
+                open.extend((0..4u8).filter(|&k| beyond[k as usize] == BOUNDARY).map(|k| (t as u32, k)));
+            }
+            open
+        })
+        .collect();
+    chunks.concat()
 }
 
 /// Marks of [`Matcher::orientations`] that are no sign.
@@ -224,20 +256,6 @@ impl Matcher<'_> {
             .collect()
     }
 
-    /// The sorted welded points of face `f`, and its [`HalfFace::parity`].
-    fn face(&self, f: u32) -> ([u32; 3], i8) {
-        let w = self.welded(f as usize / 4);
-        let mut v = OUTWARD[f as usize % 4].map(|i| w[i]);
-        let mut parity = 1;
-        for (i, j) in [(0, 1), (1, 2), (0, 1)] {
-            if v[i] > v[j] {
-                v.swap(i, j);
-                parity = -parity;
-            }
-        }
-        (v, parity)
-    }
-
     /// Pairs all faces whose tetrahedra have a known orientation, and returns the others, grouped. The share that is
     /// done goes from 0.15 to 0.9.
     fn match_oriented(
@@ -247,44 +265,53 @@ impl Matcher<'_> {
         neighbours: &[[AtomicU32; 4]],
         report: Report<'_>,
     ) -> (Tally, Vec<Vec<HalfFace>>) {
-        // Faces are dealt into buckets by ranges of their smallest point: the sorts then stay in the cache, and so do
-        // the tetrahedra of a file that numbers neighbouring points alike.
-        let records = 4 * self.corners.len();
-        // At least two of them, so that a point relative to its bucket fits into 31 bits of the key.
-        let width = (self.points / (records / RECORDS_PER_BUCKET).clamp(2, MAX_BUCKETS) + 1) as u32;
+        // Faces are dealt into buckets by ranges of their smallest point: what is done with them then stays in the cache,
+        // and so do the tetrahedra of a file that numbers neighbouring points alike.
+        let count = (4 * self.corners.len() / RECORDS_PER_BUCKET).clamp(1, MAX_BUCKETS);
+        let shift = (self.points / count).max(1).ilog2();
         let skip = |t: usize| degenerate > 0 && orientation[t] == 0 && self.is_degenerate(t);
-        let buckets = Buckets::new(records, self.points / width as usize + 1, |f| {
-            let t = f as usize / 4;
-            let w = self.welded(t);
-            let smallest = OUTWARD[f as usize % 4].map(|i| w[i]).into_iter().fold(u32::MAX, u32::min);
-            (!skip(t)).then_some((smallest / width) as usize)
+        let buckets = Buckets::new(self.corners.len(), (self.points >> shift) + 1, |t| {
+            if skip(t as usize) {
+                return [None; 2];
+            }
+            // The face opposite to the smallest point has another smallest point than the other three.
+            let [a, b, c, d] = self.welded(t as usize);
+            let (low, high) = ([a.min(b), c.min(d)], [a.max(b), c.max(d)]);
+            let least = low[0].min(low[1]);
+            let next = low[0].max(low[1]).min(high[usize::from(low[1] < low[0])]);
+            let (least, next) = ((least >> shift) as usize, (next >> shift) as usize);
+            [Some(least), (next != least).then_some(next)]
         });
         let report = |share: f64| report(0.35 + 0.55 * share);
         report(0.0);
         let progress = Progress::new(&report, buckets.len() as f64);
         let results: Vec<(Tally, Vec<Vec<HalfFace>>)> = (0..buckets.len())
             .into_par_iter()
-            .map_init(Vec::new, |keys: &mut Vec<u128>, b| {
-                keys.clear();
-                keys.extend(buckets.items(b).map(|f| {
-                    let ([x, y, z], parity) = self.face(f);
-                    let local = x - b as u32 * width;
-                    let points = (u128::from(local) << 64) | (u128::from(y) << 32) | u128::from(z);
-                    (points << 33) | (u128::from(f) << 1) | u128::from(parity > 0)
-                }));
-                keys.sort_unstable();
-                let half = |key: u128| HalfFace { face: (key >> 1) as u32, parity: if key & 1 == 1 { 1 } else { -1 } };
-                let (mut tally, mut later) = (Tally::default(), Vec::new());
-                for group in keys.chunk_by(|a, b| a >> 33 == b >> 33) {
-                    if group.iter().any(|&key| half(key).side(orientation) == 0) {
-                        later.push(group.iter().map(|&key| half(key)).collect());
-                    } else if let &[a, b] = group {
-                        tally = tally.plus(self.pair(&[half(a), half(b)], orientation, neighbours));
-                    } else if group.len() > 2 {
-                        let group: Vec<HalfFace> = group.iter().map(|&key| half(key)).collect();
-                        tally = tally.plus(self.pair(&group, orientation, neighbours));
+            .map_init(Groups::default, |groups, b| {
+                groups.clear();
+                for t in buckets.items(b) {
+                    let (points, orientation) = (self.welded(t as usize), orientation[t as usize]);
+                    for (k, face) in OUTWARD.iter().enumerate() {
+                        let (points, parity) = ascending(face.map(|i| points[i]));
+                        if (points[0] >> shift) as usize == b {
+                            let half = HalfFace { face: 4 * t + k as u32, parity };
+                            groups.push(SidedFace { points, half, side: parity * orientation });
+                        }
                     }
                 }
+                let (mut tally, mut later) = (Tally::default(), Vec::new());
+                groups.for_each(|group| {
+                    let halves = || group.iter().map(|f| f.half).collect::<Vec<_>>();
+                    if group.iter().any(|f| f.side == 0) {
+                        later.push(halves());
+                    } else if let [a, b] = group
+                        && a.side != b.side
+                    {
+                        link(neighbours, a.half, b.half);
+                    } else if group.len() > 1 {
+                        tally = tally.plus(self.pair(&halves(), orientation, neighbours));
+                    }
+                });
                 progress.add(1);
                 (tally, later)
             })
@@ -307,15 +334,9 @@ impl Matcher<'_> {
             let opposite = |h: &HalfFace| (self.welded(h.tetrahedron())[h.face as usize % 4], h.face);
             group.iter().copied().filter(|h| h.side(orientation) == side).min_by_key(opposite)
         };
-        let pair = match *group {
-            // Nearly every face: there is nothing to choose, so nothing to look up.
-            [a, b] => (a.side(orientation) != b.side(orientation)).then_some((a, b)),
-            _ => first(1).zip(first(-1)),
-        };
+        let pair = first(1).zip(first(-1));
         if let Some((a, b)) = pair {
-            for (from, to) in [(a, b), (b, a)] {
-                neighbours[from.tetrahedron()][from.face as usize % 4].store(to.face / 4, Relaxed);
-            }
+            link(neighbours, a, b);
         }
         Tally { non_manifold: usize::from(group.len() > 2), folded: usize::from(group.len() == 2 && pair.is_none()) }
     }
@@ -377,60 +398,9 @@ impl Matcher<'_> {
     }
 }
 
-/// Items of one bucket, about: its keys fit into the second-level cache.
+/// Faces or points of one bucket, about: what is kept of them fits into the second-level cache.
 const RECORDS_PER_BUCKET: usize = 1 << 13;
 const MAX_BUCKETS: usize = 1 << 13;
-
-/// The numbers 0..n dealt into buckets, ascending in each.
-struct Buckets {
-    items: Vec<AtomicU32>,
-    /// Bucket `b` is `items[starts[b]..starts[b + 1]]`.
-    starts: Vec<usize>,
-}
-
-impl Buckets {
-    /// Deals the numbers below `n` by `bucket`, which leaves out those that it has no bucket for.
-    fn new(n: usize, buckets: usize, bucket: impl Fn(u32) -> Option<usize> + Sync) -> Self {
-        let chunk = (n / 256).max(1 << 16);
-        let range = |c: usize| (c * chunk) as u32..n.min((c + 1) * chunk) as u32;
-        let mut next: Vec<Vec<u32>> = (0..n.div_ceil(chunk))
-            .into_par_iter()
-            .map(|c| {
-                let mut counts = vec![0; buckets];
-                range(c).filter_map(&bucket).for_each(|b| counts[b] += 1);
-                counts
-            })
-            .collect();
-        let mut starts = Vec::with_capacity(buckets + 1);
-        let mut at = 0;
-        for b in 0..buckets {
-            starts.push(at as usize);
-            for counts in &mut next {
-                at += std::mem::replace(&mut counts[b], at);
-            }
-        }
-        starts.push(at as usize);
-        // Each place is written once, by one thread: atomics only let several threads hold the vector.
-        let items: Vec<AtomicU32> = (0..at).into_par_iter().map(|_| AtomicU32::new(0)).collect();
-        next.par_iter_mut().enumerate().for_each(|(c, next)| {
-            for i in range(c) {
-                if let Some(b) = bucket(i) {
-                    items[next[b] as usize].store(i, Relaxed);
-                    next[b] += 1;
-                }
-            }
-        });
-        Buckets { items, starts }
-    }
-
-    fn len(&self) -> usize {
-        self.starts.len() - 1
-    }
-
-    fn items(&self, b: usize) -> impl Iterator<Item = u32> + '_ {
-        self.items[self.starts[b]..self.starts[b + 1]].iter().map(|i| i.load(Relaxed))
-    }
-}
 
 /// For each point, the smallest index of a point at exactly its position; `None` if all positions differ.
 pub(crate) fn weld(points: &[DVec3]) -> Option<Vec<u32>> {
@@ -441,7 +411,7 @@ pub(crate) fn weld(points: &[DVec3]) -> Option<Vec<u32>> {
         (mixed ^ (mixed >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9)
     };
     let count = (points.len() / RECORDS_PER_BUCKET).clamp(1, MAX_BUCKETS);
-    let buckets = Buckets::new(points.len(), count, |i| Some(((hash(i) >> 32) as usize * count) >> 32));
+    let buckets = Buckets::new(points.len(), count, |i| [Some(((hash(i) >> 32) as usize * count) >> 32)]);
     let pairs: Vec<Vec<(u32, u32)>> = (0..buckets.len())
         .into_par_iter()
         .map_init(Vec::new, |keys: &mut Vec<(u64, u32)>, b| {
