@@ -5,11 +5,13 @@
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec3;
+use halite::engine::Engine;
 use halite::field::{Component, Field, Kind, Normalization};
 use halite::geometry::TetMesh;
 use halite::gpu::{self, DeviceChoice};
 use halite::integral::{Exact, Light};
 use halite::mesh::{Mesh, cells::Tetrahedra, faces::Faces, generate};
+use halite::order::mpvo::{Mpvo, Rule};
 use halite::render::Renderer;
 use halite::transfer::{Convention, TransferFunction};
 use halite::view::{Camera, Projection, View};
@@ -104,30 +106,53 @@ fn integral(c: &mut Criterion) {
     group.finish();
 }
 
-fn frames(c: &mut Criterion) {
-    let mesh = generate::tetrahedra(SIDE);
+fn view() -> View {
     let camera = Camera {
         position: DVec3::new(3.0, 2.5, 2.0),
         focal_point: DVec3::ZERO,
         view_up: DVec3::Z,
         projection: Projection::Perspective { view_angle: 40.0 },
     };
-    let view = View::new(camera, [256, 256]).expect("a valid view");
-    let mut group = c.benchmark_group("frame");
-    group.sample_size(10);
-    let devices = gpu::devices().into_iter().filter(|d| d.lacks.is_none());
-    let named = devices.map(|d| (d.name, DeviceChoice::Named(d.index.to_string())));
-    for (name, choice) in [("cpu".to_owned(), DeviceChoice::Cpu)].into_iter().chain(named) {
-        let mut renderer = Renderer::with_device(0, choice).expect("a device");
-        renderer.set_mesh(&mesh, Tetrahedra::new(&mesh).expect("cells"));
-        renderer.set_field(&Field::new(&mesh, "s", None, Component::All).expect("a field")).expect("a field");
-        renderer.set_transfer(&transfer(Convention::Extinction));
-        renderer.render(&view, &|_| ()).expect("a frame");
-        group.throughput(Throughput::Elements(renderer.stats().steps));
-        group.bench_function(name, |b| b.iter(|| renderer.render(&view, &|_| ()).expect("a frame")));
+    View::new(camera, [256, 256]).expect("a valid view")
+}
+
+/// The visibility order of a whole mesh, as devices draw it; `cargo bench --bench orders` has larger ones.
+fn order(c: &mut Criterion) {
+    let mesh = generate::tetrahedra(SIDE);
+    let tetrahedra = Tetrahedra::new(&mesh).expect("cells");
+    let geometry = TetMesh::new(mesh.points(), &tetrahedra, &Faces::new(mesh.points(), &tetrahedra.corners));
+    let mut group = c.benchmark_group("order");
+    group.sample_size(20).throughput(Throughput::Elements(mesh.cells().len() as u64));
+    for (name, rule) in [("shared faces", Rule::Faces), ("and of the boundary", Rule::Mpvo)] {
+        let (mut mpvo, view) = (Mpvo::default(), view());
+        group.bench_function(name, |b| b.iter(|| black_box(mpvo.sequence(&geometry, &view, rule))));
     }
     group.finish();
 }
 
-criterion_group!(stages, before_drawing, integral, frames);
+/// Frames, by every engine on every device.
+fn frames(c: &mut Criterion) {
+    let mesh = generate::tetrahedra(SIDE);
+    let mut group = c.benchmark_group("frame");
+    group.sample_size(10);
+    let devices = gpu::devices().into_iter().filter(|d| d.lacks.is_none());
+    let named = devices.map(|d| (d.name, DeviceChoice::Named(d.index.to_string())));
+    for (device, choice) in [("cpu".to_owned(), DeviceChoice::Cpu)].into_iter().chain(named) {
+        for (name, engine) in [("walk", Engine::Traverse), ("projection", Engine::Project)] {
+            let mut renderer = Renderer::with_engine(0, choice.clone(), engine).expect("a device");
+            renderer.set_mesh(&mesh, Tetrahedra::new(&mesh).expect("cells"));
+            renderer.set_field(&Field::new(&mesh, "s", None, Component::All).expect("a field")).expect("a field");
+            renderer.set_transfer(&transfer(Convention::Extinction));
+            let view = view();
+            renderer.render(&view, &|_| ()).expect("a frame");
+            group.throughput(Throughput::Elements(renderer.stats().steps.max(1)));
+            group.bench_function(format!("{name}, {device}"), |b| {
+                b.iter(|| renderer.render(&view, &|_| ()).expect("a frame"));
+            });
+        }
+    }
+    group.finish();
+}
+
+criterion_group!(stages, before_drawing, integral, order, frames);
 criterion_main!(stages);

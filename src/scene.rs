@@ -26,10 +26,12 @@ use crate::cast::Reconstruction;
 use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::field::{Association, Component, Field};
+use crate::gpu::DeviceChoice;
 use crate::grid::Grid;
 use crate::integral::IntegrationOptions;
 use crate::memory;
 use crate::mesh::{Array, Arrays};
+use crate::project::ProjectionOptions;
 use crate::transfer::TransferFunction;
 use crate::view::{Blend, Camera, ClippingPlane, Cropping, DepthBuffer, DepthKind, View};
 use glam::DVec2;
@@ -69,14 +71,14 @@ pub struct Scene {
     pub background: Option<[f64; 3]>,
     /// How it is drawn, unless the program chooses.
     pub engine: Option<Engine>,
-    /// A device, for the program to choose.
-    pub device: Option<Value>,
-    /// A form of the ray integral, for the program to choose.
-    pub integral: Option<Value>,
+    /// Where it is drawn.
+    pub device: DeviceChoice,
+    /// How segments of rays are integrated.
+    pub integral: IntegrationOptions,
     /// How fields of regular and rectilinear grids are rebuilt along rays.
     pub reconstruction: Option<Reconstruction>,
     /// The projection engine's options.
-    pub projection: Option<Value>,
+    pub projection: ProjectionOptions,
 }
 
 /// Which array of the mesh is drawn.
@@ -255,10 +257,11 @@ pub fn behind_volume(view: View, opaque: &[Opaque], background: [f32; 3]) -> Res
 /// # Errors
 /// What is wrong, and where in the value.
 pub fn integral(value: &Value) -> std::result::Result<IntegrationOptions, String> {
-    if let Value::String(name) = value {
-        return IntegrationOptions::default().named(name);
-    }
-    let choice: IntegrationOptions = read(value)?;
+    let choice: IntegrationOptions = match value {
+        Value::String(name) => return IntegrationOptions::default().named(name),
+        Value::Object(_) => read(value)?,
+        other => return Err(format!("an object is meant, or the name of a form, and not {}", reader::kind(other))),
+    };
     choice.two.check().map_err(|what| format!("two: {what}"))?;
     Ok(choice)
 }

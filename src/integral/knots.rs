@@ -138,11 +138,15 @@ impl<R: Real> Knots<R> {
     /// Whether anything between `low` and `high` has extinction, or, if `direct`, a colour.
     pub(crate) fn shows(&self, low: f32, high: f32, direct: bool) -> bool {
         let channels = if direct { 4 } else { 1 };
-        let first = self.s.partition_point(|&k| k < R::of(f64::from(low))).max(1) - 1;
-        let beyond = self.s.partition_point(|&k| k <= R::of(f64::from(high)));
+        let [low, high] = [low, high].map(|s| R::of(f64::from(s)));
+        let mut first = self.interval(low);
+        while first > 0 && self.s[first] >= low {
+            first -= 1;
+        }
+        let beyond = self.interval(high) + 1;
         let positive = |v: &[R; 4]| v[..channels].iter().any(|&c| c > R::of(0.0));
         // Linear in between: from the knot below to the one above.
-        self.value[first..(beyond + 1).min(self.value.len())].iter().any(positive)
+        self.value[first..=beyond].iter().any(positive)
     }
 
     /// The first and the last interval that values from `low` to `high` are on, both finite.
@@ -363,12 +367,16 @@ pub(super) fn extinction(
     if transfer.convention() == Convention::Extinction {
         return knots.iter().map(|&(s, a)| (s, [transfer.extinction(a).min(opaque)])).collect();
     }
-    for &s in also {
+    let between = |s: f64| {
         let at = knots.partition_point(|k| k.0 < s);
-        if at > 0 && knots.get(at).is_some_and(|k| k.0 > s) {
-            knots.insert(at, (s, transfer.opacity_at(s)));
-        }
-    }
+        at > 0 && knots.get(at).is_some_and(|k| k.0 > s)
+    };
+    let mut added: Vec<f64> = also.iter().copied().filter(|&s| between(s)).collect();
+    added.sort_by(f64::total_cmp);
+    added.dedup();
+    knots.extend(added.into_iter().map(|s| (s, transfer.opacity_at(s))));
+    // Stable, so that knots at one place stay in sequence.
+    knots.sort_by(|a, b| a.0.partial_cmp(&b.0).unwrap_or(std::cmp::Ordering::Equal));
     // On its way to 1: what lies beyond `OPAQUE` has no length that f32 could tell. Where the unit distance is tiny, all that
     // is not transparent is opaque.
     let tau = |a: f64| [(-(-a.min(OPAQUE)).ln_1p() / transfer.unit_distance()).min(opaque)];

@@ -12,7 +12,10 @@ pub use range::range;
 use super::{Scalars, Scene};
 use crate::error::Result;
 use crate::field::{Association, Component, Field};
+use crate::gpu::DeviceChoice;
+use crate::integral::IntegrationOptions;
 use crate::mesh::{Arrays, Mesh, cells::Tetrahedra};
+use crate::project::ProjectionOptions;
 use crate::transfer::Axis;
 use crate::transfer::colormap::ColorMap;
 use crate::view::{Blend, Camera};
@@ -136,10 +139,10 @@ pub fn scene(mesh: &Mesh, tetrahedra: &Tetrahedra, scalars: Scalars, field: &Fie
         blend: wishes.blend,
         background: Some(BACKGROUND),
         engine: None,
-        device: None,
-        integral: None,
+        device: DeviceChoice::Auto,
+        integral: IntegrationOptions::default(),
         reconstruction: None,
-        projection: None,
+        projection: ProjectionOptions::default(),
     })
 }
 

@@ -3,17 +3,20 @@
 use super::reader::kind;
 use super::regions::{CroppingJson, SamplingJson, reconstruction};
 use super::second::{LightJson, Second, ShadeJson, TableJson, WidgetJson};
-use super::{DepthImage, Opaque, Scalars, Scene};
+use super::{DepthImage, Opaque, Scalars, Scene, integral, read};
 use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::field::{Association, Component};
+use crate::gpu::DeviceChoice;
 use crate::image::npy::Npy;
+use crate::integral::IntegrationOptions;
+use crate::project::ProjectionOptions;
 use crate::transfer::bivariate::{Bivariate, Source};
 use crate::transfer::{Convention, Emission, TransferFunction};
 use crate::view::{Blend, Camera, ClippingPlane, DepthBuffer, DepthKind, Projection, View};
 use serde::de::{IgnoredAny, Visitor};
 use serde::{Deserialize, Deserializer};
-use serde_json::{Map, Value};
+use serde_json::Value;
 use std::fmt::{self, Formatter};
 use std::path::{Path, PathBuf};
 
@@ -60,7 +63,7 @@ pub(super) struct File {
     integral: Option<Value>,
     reconstruction: Option<String>,
     sampling: Option<SamplingJson>,
-    projection: Option<Map<String, Value>>,
+    projection: Option<Value>,
     #[serde(rename = "tol")]
     _tol: Option<IgnoredAny>,
     #[serde(rename = "truth_of")]
@@ -202,10 +205,21 @@ fn check_name(at: &str, name: &str) -> Result<(), String> {
     if name.trim().is_empty() { Err(format!("{at}: the name is empty")) } else { Ok(()) }
 }
 
+/// A device by its name, or by its index.
+fn device(value: &Value) -> Result<DeviceChoice, String> {
+    match value {
+        Value::String(name) if name.trim().is_empty() => Err("the name is empty".into()),
+        Value::String(name) => Ok(DeviceChoice::parse(name)),
+        Value::Number(index) if index.is_u64() => Ok(DeviceChoice::parse(&index.to_string())),
+        other => Err(format!("the name or the index of a device is meant, and not {}", kind(other))),
+    }
+}
+
 impl File {
     /// Makes sense of it; files that it names are relative to the folder of `path`.
     pub(super) fn scene(mut self, path: &Path) -> Result<Scene> {
         let malformed = |what: String| Error::malformed(path, what);
+        let of = |key: &'static str| move |what: String| Error::malformed(path, format!("{key}: {what}"));
         self.check().map_err(malformed)?;
         let second = Second {
             widgets: self.widgets.take(),
@@ -244,11 +258,19 @@ impl File {
             },
             background: self.background,
             engine: self.engine,
-            device: self.device,
-            integral: self.integral,
+            device: self.device.as_ref().map_or(Ok(DeviceChoice::Auto), device).map_err(of("device"))?,
+            integral: self
+                .integral
+                .as_ref()
+                .map_or(Ok(IntegrationOptions::default()), integral)
+                .map_err(of("integral"))?,
             reconstruction: reconstruction(self.reconstruction.as_deref(), self.sampling.as_ref())
                 .map_err(malformed)?,
-            projection: self.projection.map(Value::Object),
+            projection: self
+                .projection
+                .as_ref()
+                .map_or(Ok(ProjectionOptions::default()), read)
+                .map_err(of("projection"))?,
         };
         // Whatever is wrong with the view is the file's mistake, and is best said before the mesh is read.
         View::new(scene.camera, scene.size)
@@ -271,9 +293,6 @@ impl File {
         if let Some(depth) = &self.depth {
             check_name("depth.file", &depth.file.to_string_lossy())?;
         }
-        if let Some(name) = self.device.as_ref().and_then(Value::as_str) {
-            check_name("device", name)?;
-        }
         for (i, knot) in self.color.iter().flatten().enumerate() {
             check_color(&format!("color[{i}]"), &knot[1..])?;
         }
@@ -283,10 +302,7 @@ impl File {
         for (i, object) in self.opaque.iter().enumerate() {
             check_color(&format!("opaque[{i}].color"), object.color())?;
         }
-        match &self.integral {
-            None | Some(Value::Object(_) | Value::String(_)) => Ok(()),
-            Some(other) => Err(format!("integral: an object is meant, or the name of a form, and not {}", kind(other))),
-        }
+        Ok(())
     }
 
     /// Takes the transfer function, or says what is wrong with it.

@@ -63,7 +63,7 @@ fn every_key_is_known() {
         r#""cells": "tets", "clamp": false, "convention": "opacity", "emission": "direct", "emission_scale": 0.3,
         "gradient_array": "g", "pixel_offset": [0.1, 0.2], "clipping_range": [0.5, 50], "blend": "maximum",
         "clipping_planes": [{"origin": [0, 0, 1], "normal": [0, 0, -1]}], "background": [0, 0.5, 1], "tol": 1e-9,
-        "truth_of": "x", "engine": "traverse", "device": "cpu", "integral": {"kind": "exact"}, "projection": {},
+        "truth_of": "x", "engine": "traverse", "device": "cpu", "integral": {"form": "exact"}, "projection": {},
         "depth": {"file": "depth.npy", "kind": "ray"}, "opaque": []"#,
     )
     .unwrap();
@@ -120,6 +120,9 @@ fn mistakes_are_named() {
         ("\"s\"", "\"\"", vec!["scalars.name", "empty"]),
         ("\"sub/ball.vtu\"", "\" \"", vec!["mesh", "empty"]),
         ("\"size\"", "\"device\": \"\", \"size\"", vec!["device", "empty"]),
+        ("\"size\"", "\"device\": [1], \"size\"", vec!["device: the name or the index", "a list"]),
+        ("\"size\"", "\"integral\": {\"kind\": 1}, \"size\"", vec!["integral: there is no key \"kind\""]),
+        ("\"size\"", "\"projection\": 1, \"size\"", vec!["projection: an object is meant"]),
         ("\"size\"", "\"depth\": {\"file\": \"\"}, \"size\"", vec!["depth.file", "empty"]),
         ("\"component\": 1", "\"component\": \"x\"", vec!["scalars.component", "magnitude"]),
         ("\"cell\"", "\"edge\"", vec!["scalars.association", "edge", "point"]),

@@ -2,12 +2,10 @@
 
 use crate::output::misuse;
 use crate::variant::{named, table};
-use anyhow::{Result, anyhow};
+use anyhow::Result;
 use clap::Args;
 use halite::integral::options::{Alpha, Build, Culling, IntegrationOptions, MOST_PIECES, Planes, Texels, Two, Weights};
 use halite::integral::table::Kind;
-use halite::scene::{Scene, integral};
-use std::path::Path;
 
 /// What of the integral's form somebody said.
 #[derive(Args, Clone)]
@@ -112,10 +110,4 @@ impl Integral {
             None => Ok(()),
         }
     }
-}
-
-/// A scene's "integral": the name of a form, or an object.
-pub(crate) fn of_scene(scene: &Scene, path: &Path) -> Result<IntegrationOptions> {
-    let Some(value) = &scene.integral else { return Ok(IntegrationOptions::default()) };
-    integral(value).map_err(|what| anyhow!("{}: integral: {what}", path.display()))
 }

@@ -362,12 +362,8 @@ impl Request {
 
     /// The device that was asked for.
     pub(crate) fn device(&self, scene: Option<&Scene>) -> DeviceChoice {
-        match (&self.device, scene.and_then(|s| s.device.as_ref())) {
-            (Some(name), _) => DeviceChoice::parse(name),
-            (None, Some(serde_json::Value::String(name))) => DeviceChoice::parse(name),
-            (None, Some(index)) => DeviceChoice::parse(&index.to_string()),
-            (None, None) => DeviceChoice::Auto,
-        }
+        let of_scene = || scene.map_or(DeviceChoice::Auto, |s| s.device.clone());
+        self.device.as_deref().map_or_else(of_scene, DeviceChoice::parse)
     }
 
     /// A renderer on `device`, with the engine and the options of projection that were asked for.
@@ -394,16 +390,14 @@ impl Request {
             ));
         }
         renderer.set_reconstruction(Reconstruction { order, sampling });
-        let projection = scene.map_or(Ok(ProjectionOptions::default()), |s| variant::of_scene(s, &self.input))?;
-        renderer.set_projection(self.variant.apply(projection));
+        renderer.set_projection(self.variant.apply(scene.map(|s| s.projection).unwrap_or_default()));
         renderer.set_integral(self.choice(scene)?);
         Ok(renderer)
     }
 
     /// The form of the integral that was asked for.
     pub(crate) fn choice(&self, scene: Option<&Scene>) -> Result<IntegrationOptions> {
-        let choice = scene.map_or(Ok(IntegrationOptions::default()), |s| integral::of_scene(s, &self.input))?;
-        let choice = self.integral.apply(choice);
+        let choice = self.integral.apply(scene.map(|s| s.integral).unwrap_or_default());
         self.integral.check(&choice)?;
         Ok(choice)
     }
@@ -419,11 +413,13 @@ impl Request {
             let given = given.join(", ");
             return Err(output::misuse(format!("{given}: study draws all variants, so none can be chosen")));
         }
-        let choice = scene.map_or(Ok(IntegrationOptions::default()), |s| integral::of_scene(s, &self.input))?;
-        let choice = self.integral.apply(choice);
+        let choice = self.integral.apply(scene.map(|s| s.integral).unwrap_or_default());
         self.integral.check(&IntegrationOptions { form: Form::Volume, ..choice })?;
         let left: Vec<_> = scene.map_or(vec![], |s| {
-            let said = [("projection", s.projection.is_some()), ("integral", s.integral.is_some())];
+            let said = [
+                ("projection", s.projection != ProjectionOptions::default()),
+                ("integral", s.integral != IntegrationOptions::default()),
+            ];
             said.into_iter().filter_map(|(key, said)| said.then_some(key)).collect()
         });
         if !left.is_empty() {

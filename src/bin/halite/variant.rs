@@ -1,11 +1,9 @@
 //! The options of the projection engine, as options and in scenes.
 
-use anyhow::{Result, anyhow};
 use clap::Args;
 use halite::project::{Compositing, Cycles, Fragments, Order, ProjectionOptions, Target, Thickness};
-use halite::scene::{Scene, read};
+use halite::scene::read;
 use serde::de::DeserializeOwned;
-use std::path::Path;
 
 /// What of the projection engine's variant somebody said.
 #[derive(Args, Clone)]
@@ -62,12 +60,6 @@ impl Variant {
         ];
         all.into_iter().filter_map(|(name, given)| given.then_some(name)).collect()
     }
-}
-
-/// The options of the projection engine that a scene's "projection" says.
-pub(crate) fn of_scene(scene: &Scene, path: &Path) -> Result<ProjectionOptions> {
-    let Some(value) = &scene.projection else { return Ok(ProjectionOptions::default()) };
-    read(value).map_err(|what| anyhow!("{}: projection: {what}", path.display()))
 }
 
 /// A variant by the name that scenes know it by.
