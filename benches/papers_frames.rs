@@ -119,7 +119,7 @@ fn tiles_against_volumes(mut renderer: Renderer) {
     let mesh = distance_ball();
     let tetrahedra = Tetrahedra::new(&mesh).expect("cells");
     println!("Röttger & Ertl 2002, table 8: a distance ball of {} tetrahedra, 512 x 384", tetrahedra.corners.len());
-    renderer.set_mesh(&mesh, tetrahedra);
+    renderer.set_tetrahedra(&mesh, tetrahedra);
     let field = Field::new(&mesh, "distance", Some(Association::Point), Component::Index(0)).expect("a field");
     renderer.set_field(&field).expect("a field");
     let band = |k: usize| {
@@ -193,7 +193,7 @@ fn sorts_and_data(mut renderer: Renderer) {
         let count = tetrahedra.corners.len();
         let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         let (low, high) = mesh.points().iter().fold(none, |(l, h), &p| (l.min(p), h.max(p)));
-        renderer.set_mesh(&mesh, tetrahedra);
+        renderer.set_tetrahedra(&mesh, tetrahedra);
         let field = Field::new(&mesh, array, Some(Association::Point), Component::Index(0)).expect("a field");
         let [least, most] = field.range(0);
         renderer.set_field(&field).expect("a field");

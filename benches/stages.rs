@@ -140,7 +140,7 @@ fn frames(c: &mut Criterion) {
     for (device, choice) in [("cpu".to_owned(), DeviceChoice::Cpu)].into_iter().chain(named) {
         for (name, engine) in [("walk", Engine::Traverse), ("projection", Engine::Project)] {
             let mut renderer = Renderer::with_engine(0, choice.clone(), engine).expect("a device");
-            renderer.set_mesh(&mesh, Tetrahedra::new(&mesh).expect("cells"));
+            renderer.set_mesh(&mesh).expect("cells");
             renderer.set_field(&Field::new(&mesh, "s", None, Component::All).expect("a field")).expect("a field");
             renderer.set_transfer(&transfer(Convention::Extinction));
             let view = view();

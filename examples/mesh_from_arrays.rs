@@ -3,7 +3,6 @@
 use glam::DVec3;
 use halite::field::{Component, Field};
 use halite::image::Backdrop;
-use halite::mesh::cells::Tetrahedra;
 use halite::mesh::{Array, Cells, Mesh, Values};
 use halite::render::Renderer;
 use halite::transfer::TransferFunction;
@@ -48,7 +47,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
 
     let mut renderer = Renderer::new(0)?;
-    renderer.set_mesh(&mesh, Tetrahedra::new(&mesh)?);
+    renderer.set_mesh(&mesh)?;
     renderer.set_field(&Field::new(&mesh, "distance", None, Component::Magnitude)?)?;
     // Opacities count per 0.1 of length.
     renderer.set_transfer(&TransferFunction::new(color, opacity, 0.1)?);

@@ -188,10 +188,10 @@ impl Session {
         let moved = moved.transpose()?;
         self.renderer.check_room(mesh.points().len(), &tetrahedra)?;
         match moved {
-            None => self.renderer.set_mesh(mesh, tetrahedra),
+            None => self.renderer.set_tetrahedra(mesh, tetrahedra),
             Some(moved) if self.mirrored => self.renderer.load(&moved, mesh.cells().len(), tetrahedra, &|_| {}),
             Some(moved) => {
-                self.renderer.set_mesh(mesh, tetrahedra);
+                self.renderer.set_tetrahedra(mesh, tetrahedra);
                 self.renderer.set_points(&moved)?;
             }
         }

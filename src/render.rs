@@ -197,18 +197,30 @@ impl Renderer {
         self.pool.install(work)
     }
 
-    /// Draws another mesh from now on, split into `tetrahedra`; the field must be set again.
-    pub fn set_mesh(&mut self, mesh: &Mesh, tetrahedra: Tetrahedra) {
-        self.set_mesh_with_progress(mesh, tetrahedra, &|_| {});
+    /// Draws another mesh from now on; the field must be set again.
+    ///
+    /// # Errors
+    /// Those of [`Tetrahedra::new`], and [`Error::NoMemory`] if there is no room for the mesh as engines read it.
+    pub fn set_mesh(&mut self, mesh: &Mesh) -> Result<()> {
+        let tetrahedra = self.install(|| Tetrahedra::new(mesh))?;
+        tetrahedra.log();
+        self.check_room(mesh.points().len(), &tetrahedra)?;
+        self.set_tetrahedra(mesh, tetrahedra);
+        Ok(())
     }
 
-    /// As [`Self::set_mesh`]; `report` is called, on any thread, with the share of the work that is done: from 0 to 1,
+    /// As [`Self::set_mesh`], of a mesh that is split into `tetrahedra` already.
+    pub fn set_tetrahedra(&mut self, mesh: &Mesh, tetrahedra: Tetrahedra) {
+        self.set_tetrahedra_with_progress(mesh, tetrahedra, &|_| {});
+    }
+
+    /// As [`Self::set_tetrahedra`]; `report` is called, on any thread, with the share of the work that is done: from 0 to 1,
     /// never falling.
-    pub fn set_mesh_with_progress(&mut self, mesh: &Mesh, tetrahedra: Tetrahedra, report: &(dyn Fn(f64) + Sync)) {
+    pub fn set_tetrahedra_with_progress(&mut self, mesh: &Mesh, tetrahedra: Tetrahedra, report: &(dyn Fn(f64) + Sync)) {
         self.load(mesh.points(), mesh.cells().len(), tetrahedra, report);
     }
 
-    /// As [`Self::set_mesh_with_progress`], of a mesh of so many `cells` and these points.
+    /// As [`Self::set_tetrahedra_with_progress`], of a mesh of so many `cells` and these points.
     pub(crate) fn load(
         &mut self,
         points: &[DVec3],

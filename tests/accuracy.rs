@@ -25,7 +25,7 @@ fn errors(mesh: &Mesh, of: Association, transfer: &TransferFunction, projection:
     let view = View::new(camera, [80, 60]).unwrap().with_blend(blend);
     let truth = halite::reference::render(mesh, &tetrahedra, &field, transfer, &view).unwrap();
     let mut renderer = Renderer::new(0).unwrap();
-    renderer.set_mesh(mesh, tetrahedra);
+    renderer.set_tetrahedra(mesh, tetrahedra);
     renderer.set_field(&field).unwrap();
     renderer.set_transfer(transfer);
     let image = renderer.render(&view, &|_| {}).unwrap();

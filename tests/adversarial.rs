@@ -121,7 +121,7 @@ fn images(scene: &Scene, view: &View) -> Vec<(&'static str, Image)> {
         && let Some(renderer) = &*DEVICE
     {
         let mut renderer = renderer.lock().unwrap();
-        renderer.set_mesh(&scene.mesh, scene.tetrahedra.clone());
+        renderer.set_tetrahedra(&scene.mesh, scene.tetrahedra.clone());
         renderer.set_field(&scene.field).unwrap();
         renderer.set_transfer(&scene.transfer);
         images.push(("device", renderer.render(view, &|_| ()).unwrap()));

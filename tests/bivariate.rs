@@ -265,7 +265,7 @@ fn what_has_no_gradient_is_refused() {
     let pairs = Field::from_slice("p", &values, 1, Association::Cell, Component::Index(0)).unwrap();
     let draw = |field: &Field, transfer: &TransferFunction, blend: Blend| {
         let mut renderer = Renderer::with_device(2, DeviceChoice::Cpu).unwrap();
-        renderer.set_mesh(&mesh, tetrahedra.clone());
+        renderer.set_tetrahedra(&mesh, tetrahedra.clone());
         renderer.set_field(field).unwrap();
         renderer.set_transfer(transfer);
         renderer.render(&view(16).with_blend(blend), &|_| ())

@@ -7,7 +7,6 @@ use halite::field::{Component, Field};
 use halite::gpu::DeviceChoice;
 use halite::grid::{Grid, Lattice};
 use halite::image::Image;
-use halite::mesh::cells::Tetrahedra;
 use halite::mesh::{Array, Values, generate};
 use halite::render::{Engine, Renderer};
 use halite::transfer::TransferFunction;
@@ -40,7 +39,7 @@ fn renderers() -> Vec<(String, Renderer, DVec3, f64)> {
             eprintln!("skipped in part: there is no device");
             continue;
         }
-        renderer.set_mesh(&mesh, Tetrahedra::new(&mesh).unwrap());
+        renderer.set_mesh(&mesh).unwrap();
         renderer.set_field(&field).unwrap();
         renderer.set_transfer(&transfer(&field));
         let name = format!("{engine:?} on {}", renderer.stats().device);

@@ -41,7 +41,7 @@ fn draw(mesh: &Mesh, engine: Engine) -> Image {
     let color = vec![(0.2, [0.1, 0.3, 0.9]), (2.0, [0.9, 0.8, 0.2]), (4.9, [0.9, 0.1, 0.1])];
     let transfer = TransferFunction::new(color, vec![(0.2, 0.0), (1.1, 0.3), (1.3, 0.02), (4.9, 1.0)], 0.8).unwrap();
     let mut renderer = Renderer::with_engine(2, DeviceChoice::Cpu, engine).unwrap();
-    renderer.set_mesh(mesh, tetrahedra);
+    renderer.set_tetrahedra(mesh, tetrahedra);
     renderer.set_field(&field).unwrap();
     renderer.set_transfer(&transfer);
     renderer.render(&View::new(camera, [160, 120]).unwrap(), &|_| ()).unwrap()

@@ -10,7 +10,6 @@ use halite::gpu::DeviceChoice;
 use halite::grid::{Grid, Lattice};
 use halite::image::Image;
 use halite::io::{DataSet, Source};
-use halite::mesh::cells::Tetrahedra;
 use halite::mesh::{Array, Values};
 use halite::render::Renderer;
 use halite::scene::Scene;
@@ -226,7 +225,7 @@ fn the_walk_through_voxels_shows_the_same() {
     let grid = Grid::regular(&lattice, vec![linear], cells).unwrap();
     let mesh = grid.clone().into_mesh().unwrap();
     let mut walk = Renderer::with_device(2, DeviceChoice::Cpu).unwrap();
-    walk.set_mesh(&mesh, Tetrahedra::new(&mesh).unwrap());
+    walk.set_mesh(&mesh).unwrap();
     walk.set_transfer(&transfer());
     for (name, of) in [("s", Association::Point), ("c", Association::Cell)] {
         let on = |of_grid: bool| {

@@ -207,7 +207,7 @@ fn what_has_no_table_is_said() {
     }
     // Meshes have no slabs.
     let mesh = halite::mesh::generate::tetrahedra(2);
-    renderer.set_mesh(&mesh, halite::mesh::cells::Tetrahedra::new(&mesh).unwrap());
+    renderer.set_mesh(&mesh).unwrap();
     let name = mesh.point_arrays()[0].name.clone();
     renderer.set_field(&Field::new(&mesh, &name, None, Component::Index(0)).unwrap()).unwrap();
     renderer.set_integral(IntegrationOptions::of(Form::SecondOrderPolynomial));

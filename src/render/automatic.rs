@@ -27,7 +27,7 @@ impl Renderer {
             Result::Ok((tetrahedra, field, scene))
         })?;
         let (view, _) = scene.view()?;
-        self.set_mesh(mesh, tetrahedra);
+        self.set_tetrahedra(mesh, tetrahedra);
         self.set_field(&field)?;
         self.set_transfer(&scene.transfer);
         Ok((self.render(&view, &|_| ())?, scene))

@@ -115,7 +115,7 @@ pub(crate) fn on_device(engine: render::Engine) -> Option<Renderer> {
 
 /// Has `renderer` draw `scene`.
 pub(crate) fn set(renderer: &mut Renderer, scene: &Scene) {
-    renderer.set_mesh(&scene.mesh, scene.tetrahedra.clone());
+    renderer.set_tetrahedra(&scene.mesh, scene.tetrahedra.clone());
     renderer.set_field(&scene.field).unwrap();
     renderer.set_transfer(&scene.transfer);
 }

@@ -122,7 +122,9 @@ fn measure(options: &Options, job: &Job, renderer: &mut Renderer) -> Result<Run>
         renderer.set_grid(grid)?;
     } else {
         renderer.check_room(job.mesh.points().len(), &job.tetrahedra)?;
-        progress::during("matching faces", |p| renderer.set_mesh_with_progress(&job.mesh, job.tetrahedra.clone(), p));
+        progress::during("matching faces", |p| {
+            renderer.set_tetrahedra_with_progress(&job.mesh, job.tetrahedra.clone(), p)
+        });
     }
     renderer.set_field(&job.field)?;
     renderer.set_transfer(&job.scene.transfer);

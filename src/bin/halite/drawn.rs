@@ -32,7 +32,7 @@ pub(crate) fn draw(job: Job, renderer: &mut Renderer) -> Result<Drawn> {
         Some(grid) => renderer.set_grid(grid)?,
         None => {
             renderer.check_room(mesh.points().len(), &tetrahedra)?;
-            progress::during("matching faces", |p| renderer.set_mesh_with_progress(&mesh, tetrahedra, p));
+            progress::during("matching faces", |p| renderer.set_tetrahedra_with_progress(&mesh, tetrahedra, p));
         }
     }
     renderer.set_field(&field)?;

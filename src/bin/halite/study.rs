@@ -205,7 +205,7 @@ fn check<T>(rows: &[T]) -> Result<()> {
 }
 
 fn set(renderer: &mut Renderer, job: &Job) -> halite::Result<()> {
-    renderer.set_mesh(&job.mesh, job.tetrahedra.clone());
+    renderer.set_tetrahedra(&job.mesh, job.tetrahedra.clone());
     renderer.set_field(&job.field)?;
     renderer.set_transfer(&job.scene.transfer);
     Ok(())

@@ -25,7 +25,6 @@ impl Fault {
 
 use crate::field::{Association, Component, Field};
 use crate::gpu::DeviceChoice;
-use crate::mesh::cells::Tetrahedra;
 use crate::mesh::{Mesh, generate};
 use crate::render::{Engine, Renderer};
 use crate::transfer::TransferFunction;
@@ -39,7 +38,7 @@ fn renderer(mesh: &Mesh, engine: Engine) -> Renderer {
     let [lo, hi] = field.range(0);
     let color = vec![(lo, [0.1, 0.3, 0.9]), (hi, [0.9, 0.5, 0.1])];
     let opacity = vec![(lo, 0.3), (0.6 * lo + 0.4 * hi, 1.5), (hi, 0.5)];
-    renderer.set_mesh(mesh, Tetrahedra::new(mesh).unwrap());
+    renderer.set_mesh(mesh).unwrap();
     renderer.set_field(&field).unwrap();
     renderer.set_transfer(&TransferFunction::new(color, opacity, 1.0).unwrap());
     renderer

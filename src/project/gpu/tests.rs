@@ -5,7 +5,7 @@ use crate::field::{Association, Component, Field, Kind};
 use crate::gpu::raster::Readback;
 use crate::gpu::testing::{bindings, gpu, validated};
 use crate::integral::lookup::tests::{choices, exact};
-use crate::mesh::{cells::Tetrahedra, generate};
+use crate::mesh::generate;
 use crate::order::MOST_PARTS;
 use crate::order::depth::{self, HIDDEN};
 use crate::project::gpu::frame::{Limits, ViewUniforms};
@@ -141,7 +141,7 @@ fn the_device_sorts_as_the_host_does() {
 fn prepared(engine: Engine, choice: DeviceChoice, n: usize, size: [u32; 2]) -> (Renderer, View) {
     let mut renderer = Renderer::with_engine(2, choice, engine).unwrap();
     let mesh = generate::tetrahedra(n);
-    renderer.set_mesh(&mesh, Tetrahedra::new(&mesh).unwrap());
+    renderer.set_mesh(&mesh).unwrap();
     let field = Field::new(&mesh, "s", Some(Association::Point), Component::Index(0)).unwrap();
     renderer.set_field(&field).unwrap();
     let [low, high] = field.range(0);

@@ -4,7 +4,7 @@ use crate::field::{Component, Field};
 use crate::gpu::DeviceChoice;
 use crate::image::Image;
 use crate::integral::options::{FEW_KNOTS, Form, IntegrationOptions};
-use crate::mesh::{cells::Tetrahedra, generate};
+use crate::mesh::generate;
 use crate::render::Renderer;
 use crate::transfer::TransferFunction;
 use crate::view::{Camera, Projection, View};
@@ -19,7 +19,7 @@ fn view() -> View {
 fn renderer() -> Renderer {
     let mut renderer = Renderer::with_device(2, DeviceChoice::Cpu).unwrap();
     let mesh = generate::tetrahedra(3);
-    renderer.set_mesh(&mesh, Tetrahedra::new(&mesh).unwrap());
+    renderer.set_mesh(&mesh).unwrap();
     renderer.set_field(&Field::new(&mesh, "s", None, Component::Index(0)).unwrap()).unwrap();
     renderer
 }

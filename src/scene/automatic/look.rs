@@ -346,7 +346,7 @@ mod tests {
             let wishes = Wishes::default();
             let transfer = transfer(&mesh, &tetrahedra, &scalars, &field, camera, &wishes).unwrap();
             let mut renderer = crate::render::Renderer::with_device(2, crate::gpu::DeviceChoice::Cpu).unwrap();
-            renderer.set_mesh(&mesh, tetrahedra.clone());
+            renderer.set_tetrahedra(&mesh, tetrahedra.clone());
             renderer.set_field(&field).unwrap();
             renderer.set_transfer(&transfer);
             let image = renderer.render(&View::new(camera, size).unwrap(), &|_| ()).unwrap();

@@ -6,7 +6,6 @@ use crate::error::Error;
 use crate::field::{Association, Component, Field};
 use crate::gpu::testing::choice;
 use crate::gpu::{DeviceChoice, Gpu};
-use crate::mesh::cells::Tetrahedra;
 use crate::mesh::{Mesh, generate};
 use crate::render::Renderer;
 use crate::traverse::gpu::RayUniforms;
@@ -19,7 +18,7 @@ fn only_what_changed_is_handed_over() {
     let mesh = plain(generate::tetrahedra(9));
     let mut random = Random(1);
     let mut renderer = Renderer::with_device(0, choice).unwrap();
-    renderer.set_mesh(&mesh, Tetrahedra::new(&mesh).unwrap());
+    renderer.set_mesh(&mesh).unwrap();
     let field = |name: &str| Field::new(&mesh, name, Some(Association::Point), Component::All).unwrap();
     renderer.set_field(&field("scalar")).unwrap();
     renderer.set_transfer(&random_transfer(&mut random, false));
@@ -76,7 +75,7 @@ fn moved_points_are_drawn_where_they_are() {
     let moved = moved.unwrap();
     let [got, want] = [(&mesh, choice), (&moved, DeviceChoice::Cpu)].map(|(mesh, choice)| {
         let mut renderer = Renderer::with_device(0, choice).unwrap();
-        renderer.set_mesh(mesh, Tetrahedra::new(mesh).unwrap());
+        renderer.set_mesh(mesh).unwrap();
         renderer.set_field(&Field::new(mesh, "scalar", Some(Association::Point), Component::All).unwrap()).unwrap();
         renderer.set_transfer(&transfer);
         draw(&mut renderer, &view);
@@ -95,7 +94,7 @@ fn a_lost_device_is_survived() {
     let mesh = plain(generate::tetrahedra(6));
     let mut random = Random(9);
     let mut renderer = Renderer::with_device(0, choice).unwrap();
-    renderer.set_mesh(&mesh, Tetrahedra::new(&mesh).unwrap());
+    renderer.set_mesh(&mesh).unwrap();
     renderer.set_field(&Field::new(&mesh, "scalar", None, Component::All).unwrap()).unwrap();
     renderer.set_transfer(&random_transfer(&mut random, false));
     let view = random_view(&mut random, [24, 24]);
@@ -113,7 +112,7 @@ fn the_budget_is_kept() {
     let mesh = plain(generate::tetrahedra(9));
     let mut random = Random(2);
     let mut renderer = Renderer::with_device(0, choice).unwrap();
-    renderer.set_mesh(&mesh, Tetrahedra::new(&mesh).unwrap());
+    renderer.set_mesh(&mesh).unwrap();
     renderer.set_field(&Field::new(&mesh, "scalar", None, Component::All).unwrap()).unwrap();
     renderer.set_transfer(&random_transfer(&mut random, false));
     let view = random_view(&mut random, [24, 24]);

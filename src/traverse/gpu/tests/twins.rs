@@ -6,7 +6,6 @@ use crate::error::Error;
 use crate::field::{Association, Component, Field};
 use crate::gpu::testing::{bindings, choice};
 use crate::gpu::{DeviceChoice, Part};
-use crate::mesh::cells::Tetrahedra;
 use crate::mesh::{Mesh, generate};
 use crate::render::{Engine, Renderer};
 use crate::view::{Blend, Camera, Projection, View};
@@ -24,7 +23,7 @@ fn compare(rounds: usize, frames: usize, size: [u32; 2], seed: u64) {
         let mut pair =
             [choice.clone(), DeviceChoice::Cpu].map(|c| Renderer::with_engine(0, c, Engine::Traverse).unwrap());
         for r in &mut pair {
-            r.set_mesh(&mesh, Tetrahedra::new(&mesh).unwrap());
+            r.set_mesh(&mesh).unwrap();
         }
         for frame in 0..frames {
             let array = ["scalar", "pair", "rgba"][random.below(3)];
@@ -96,7 +95,7 @@ fn the_twins_agree_where_rays_lie_in_faces() {
         let mut pair =
             [choice.clone(), DeviceChoice::Cpu].map(|c| Renderer::with_engine(0, c, Engine::Traverse).unwrap());
         for r in &mut pair {
-            r.set_mesh(&mesh, Tetrahedra::new(&mesh).unwrap());
+            r.set_mesh(&mesh).unwrap();
             r.set_field(&Field::new(&mesh, "scalar", Some(Association::Point), Component::All).unwrap()).unwrap();
             r.set_transfer(&transfer);
         }
@@ -140,7 +139,7 @@ fn ten_million_tetrahedra_are_drawn() {
     let Some(choice) = choice() else { return };
     let mesh = generate::tetrahedra(119);
     let mut renderer = Renderer::with_device(0, choice).unwrap();
-    renderer.set_mesh(&mesh, Tetrahedra::new(&mesh).unwrap());
+    renderer.set_mesh(&mesh).unwrap();
     renderer.set_field(&Field::new(&mesh, "s", None, Component::All).unwrap()).unwrap();
     let mut random = Random(4);
     renderer.set_transfer(&random_transfer(&mut random, false));
@@ -174,7 +173,7 @@ fn arrays_of_several_bindings_are_one() {
     let view = random_view(&mut random, [40, 32]);
     for engine in [Engine::Traverse, Engine::Project] {
         let mut renderer = Renderer::with_engine(0, choice.clone(), engine).unwrap();
-        renderer.set_mesh(&mesh, Tetrahedra::new(&mesh).unwrap());
+        renderer.set_mesh(&mesh).unwrap();
         renderer.set_transfer(&transfer);
         for (array, association) in
             [("scalar", Association::Cell), ("pair", Association::Cell), ("rgba", Association::Point)]
