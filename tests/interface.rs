@@ -122,7 +122,7 @@ fn interface() -> String {
     lines.sort();
     lines.dedup();
     lines.iter().fold(String::new(), |mut all, l| {
-        let _ = writeln!(all, "{l}");
+        let _ = writeln!(all, "{}", l.trim_end());
         all
     })
 }
