@@ -5,6 +5,12 @@
 //! which is cut where it meets a line's end and summed up by the same rule. What f32 has too few digits for, a device finds and
 //! leaves: the CPU draws the whole ray then ([`ray`](super::ray), in f64).
 
+/// Names of fields, and where they are.
+#[cfg(test)]
+macro_rules! offsets {
+    ($of:ty: $($field:ident),*) => { [$((stringify!($field), std::mem::offset_of!($of, $field))),*] };
+}
+
 mod frame;
 mod lines;
 mod texels;

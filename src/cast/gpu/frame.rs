@@ -148,3 +148,10 @@ fn clipping(volume: &Volume, view: &View, times: DVec3, plus: DVec3) -> Vec<[f32
     };
     view.clipping_planes().iter().map(plane).collect()
 }
+
+/// Where fields of [`CastUniforms`] are.
+#[cfg(test)]
+pub(super) const OFFSETS: &[(&str, usize)] = &offsets!(
+    CastUniforms: origin, direction, along, maps, still, reach, cells, planes, axes, has_ends, strides, size, first_row, rows,
+    near, far, most_work, pace, missing, skips
+);

@@ -69,7 +69,7 @@ impl Map {
 /// `Line` in the shader.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
-struct Line {
+pub(super) struct Line {
     value: [f32; 4],
     slope: [f32; 4],
     low: f32,
@@ -87,7 +87,7 @@ struct Line {
 /// `Lines` in the shader.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
-struct Ends {
+pub(super) struct Ends {
     color: u32,
     end: u32,
     scale: f32,
@@ -245,3 +245,10 @@ impl Lines {
         ])
     }
 }
+
+/// Where fields of [`Line`] and [`Ends`] are.
+#[cfg(test)]
+pub(super) const OFFSETS: &[(&str, usize)] =
+    &offsets!(Line: value, slope, low, high, start, curve, inner, shown, narrow, steps, flags, unused);
+#[cfg(test)]
+pub(super) const OFFSETS_OF_ENDS: &[(&str, usize)] = &offsets!(Ends: color, end, scale, unused);

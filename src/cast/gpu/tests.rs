@@ -124,6 +124,34 @@ fn case(random: &mut Random, of: usize) -> Case {
     Case { grid, field, transfer, view, how: Reconstruction { order, sampling } }
 }
 
+/// Structures of the program, and what lies where in them.
+#[test]
+fn layouts_match_their_rust_twins() {
+    let mut seen = std::collections::BTreeSet::new();
+    for seed in 0..60 {
+        let mut random = Random(seed * 7919 + 3);
+        let of = [1, 2, 4][random.below(3)];
+        case(&mut random, of).drawn(|frame| {
+            let count = |(name, element)| ShaderArray { name, element, chunks: 1 + random.below(3), shift: 8 };
+            let source = program(frame, frame.exact.curved.is_some(), &ARRAYS.map(count));
+            let module = testing::validated(&source);
+            for (name, size, twin) in [
+                ("CastUniforms", size_of::<CastUniforms>(), frame::OFFSETS),
+                ("Line", size_of::<lines::Line>(), lines::OFFSETS),
+                ("Lines", size_of::<lines::Ends>(), lines::OFFSETS_OF_ENDS),
+            ] {
+                let (_, of) = module.types.iter().find(|(_, t)| t.name.as_deref() == Some(name)).unwrap();
+                let wgpu::naga::TypeInner::Struct { span, members } = &of.inner else { panic!("{name} is no struct") };
+                assert_eq!(*span as usize, size, "{name}");
+                let got: Vec<_> = members.iter().map(|m| (m.name.as_deref().unwrap(), m.offset as usize)).collect();
+                assert_eq!(got, twin, "{name}");
+            }
+            seen.insert((frame.samples.components, frame.exact.direct, frame.exact.curved.is_some()));
+        });
+    }
+    assert!(seen.len() > 8, "{seen:?}");
+}
+
 #[test]
 fn a_device_draws_what_f64_draws() {
     let Some(gpu) = testing::gpu() else { return };

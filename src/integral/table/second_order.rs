@@ -25,10 +25,10 @@ use crate::integral::cubic::Cubic;
 use crate::integral::{Exact, Light};
 use parabolas::Parabolas;
 use rayon::prelude::*;
-use slices::Slices;
+pub(crate) use slices::Slices;
 
 /// How far parabolas reach through samples in [−1, 1].
-const REACH: f64 = 1.25;
+pub(crate) const REACH: f64 = 1.25;
 
 /// The greatest slope of such.
 const STEEPEST: f64 = 8.0;
@@ -131,7 +131,7 @@ impl Slabs {
 }
 
 /// What 255 stands for in the colours of slabs of this length.
-fn span(exact: &Exact<f64>, length: f64) -> f32 {
+pub(crate) fn span(exact: &Exact<f64>, length: f64) -> f32 {
     let brightest = exact.opacity.value.iter().flat_map(|v| &v[1..]).fold(0.0, |most: f64, c| most.max(*c));
     (if exact.direct { brightest * length } else { brightest }).max(1.0) as f32
 }
