@@ -5,14 +5,7 @@
 //! which is cut where it meets a line's end and summed up by the same rule. What f32 has too few digits for, a device finds and
 //! leaves: the CPU draws the whole ray then ([`ray`](super::ray), in f64).
 
-/// Names of fields, and where they are.
-#[cfg(test)]
-macro_rules! offsets {
-    ($of:ty: $($field:ident),*) => { [$((stringify!($field), std::mem::offset_of!($of, $field))),*] };
-}
-
 mod frame;
-mod lines;
 mod texels;
 
 use super::ray::{self, Frame, Visible, least_light};
@@ -22,22 +15,20 @@ use crate::error::{Error, Result};
 use crate::gpu::arrays::{self, INVISIBLE};
 use crate::gpu::buffers::{Buffer, Chunks};
 use crate::gpu::clock::Clock;
+use crate::gpu::lines::{Lines, Map};
 use crate::gpu::raster::{Readback, Slot};
 use crate::gpu::rays::FAR;
-use crate::gpu::shader::{self, ShaderArray, ShaderVariant};
+use crate::gpu::shader::{self, ShaderArray};
+use crate::gpu::stretch::{self, StretchVariant};
 use crate::gpu::{Gpu, Part, raster};
-use crate::integral::MOST_OF_PART;
-use crate::integral::cubic::stretch;
 use crate::view::Blend;
 use frame::{CastUniforms, FINEST, fineness, planes_of};
-use lines::{BUCKETS, Lines, Map, OFF};
 use rayon::prelude::*;
 use std::fmt::Write;
 use texels::Texel;
 use wgpu::{BufferUsages as Usage, ShaderStages as Stages};
 
 const CAST: &str = include_str!("../../shaders/cast.wgsl");
-const STRETCH: &str = include_str!("../../shaders/cast_stretch.wgsl");
 
 /// The arrays that the caster reads, and what WGSL calls their elements.
 const ARRAYS: [(&str, &str); 4] = [("words", "u32"), ("axes", "vec2f"), ("hidden", "u32"), ("seen", "u32")];
@@ -57,13 +48,6 @@ const FEW: usize = 4;
 
 /// How near to a plane a ray that stays beside it is in it, in widths of a voxel.
 const SNAP: f32 = 1e-6;
-
-/// Values that differ by less, along a ray through a voxel, meet a step of the function where f32 cannot say.
-const FLAT: f32 = 1e-3;
-
-/// How near to a knot a root is, and after how short a step of Newton's what is left is about its square.
-const NEAR: f32 = 2e-7;
-const SHORT: f32 = 1e-3;
 
 /// How much worse than a map of their own the one that values were handed over by may be.
 const WORSE: f64 = 8.0;
@@ -335,42 +319,15 @@ fn cast(
 fn program(frame: &Frame, are_curved: bool, arrays: &[ShaderArray]) -> String {
     let Frame { volume, samples, exact, reconstruction, .. } = *frame;
     let Reconstruction { order, sampling } = reconstruction;
-    let kind = exact.kind;
-    let mut text = shader::prelude(&ShaderVariant { kind, direct: exact.direct });
-    // BUCKETS of other integrals.
-    text = text
-        .lines()
-        .filter(|line| !line.starts_with("const BUCKETS"))
-        .fold(String::new(), |text, line| text + line + "\n");
-    for (name, value) in [
-        ("FAR", FAR),
-        ("UNFINISHED", UNFINISHED),
-        ("SNAP", SNAP),
-        ("FLAT", FLAT),
-        ("OFF", OFF),
-        ("NEAR", NEAR),
-        ("SHORT", SHORT),
-        ("LEAST_TRANSMITTANCE", least_light(exact.direct) as f32),
-        ("DEEPEST", stretch::DEEPEST),
-        ("MOST", stretch::MOST),
-        ("MOST_BENT", stretch::MOST_BENT),
-        ("END", stretch::END),
-        ("BENDING", (1.0 / (1.0 - MOST_OF_PART)) as f32),
-    ] {
-        let _ = writeln!(text, "const {name} = {value:?}f;");
-    }
-    let column = |k: usize| stretch::UP_TO.map(|row| row[k]);
-    for (name, [x, y, z]) in [
-        ("NODES", stretch::NODES),
-        ("WEIGHTS", stretch::WEIGHTS),
-        ("UP_TO_FRONT", column(0)),
-        ("UP_TO_A", column(1)),
-        ("UP_TO_B", column(2)),
-        ("UP_TO_C", column(3)),
-        ("UP_TO_BACK", column(4)),
-    ] {
-        let _ = writeln!(text, "const {name} = vec3f({x:?}f, {y:?}f, {z:?}f);");
-    }
+    let mut text = stretch::prelude(&StretchVariant {
+        kind: exact.kind,
+        direct: exact.direct,
+        are_curved,
+        is_maximum: frame.view.blend() == Blend::Maximum,
+        has_means: false,
+        least: least_light(exact.direct) as f32,
+    });
+    let _ = writeln!(text, "const UNFINISHED = {UNFINISHED:?}f;\nconst SNAP = {SNAP:?}f;");
     let number = |of: Order| Order::ALL.iter().position(|(_, o)| *o == of).unwrap_or(0);
     for (name, of) in [
         ("EXACT", Order::Exact),
@@ -385,8 +342,6 @@ fn program(frame: &Frame, are_curved: bool, arrays: &[ShaderArray]) -> String {
     }
     let by_length = order != Order::Exact && matches!(sampling, Sampling::Steps(_));
     for (name, value) in [
-        ("MAXIMUM", frame.view.blend() == Blend::Maximum),
-        ("CURVED", are_curved),
         ("EVEN", volume.even),
         ("HIDES", volume.hidden.is_some()),
         ("OF_CELLS", samples.of_cells),
@@ -394,63 +349,10 @@ fn program(frame: &Frame, are_curved: bool, arrays: &[ShaderArray]) -> String {
     ] {
         let _ = writeln!(text, "const {name} = {value};");
     }
-    for (name, value) in
-        [("BUCKETS", BUCKETS), ("BLOCK", 1 << BLOCK), ("COMPONENTS", samples.components), ("PARTS", order.parts())]
-    {
-        let _ = writeln!(text, "const {name} = {value}u;");
-    }
-    let mut series = String::from("0.0");
-    for c in stretch::LOGARITHM.iter().rev() {
-        series = format!("({c:?}f + w * {series})");
-    }
-    let _ = writeln!(text, "fn logarithm(w: f32) -> f32 {{ return {series}; }}");
-    text += emission(samples.components);
+    let _ = writeln!(text, "const BLOCK = {}u;\nconst PARTS = {}u;", 1 << BLOCK, order.parts());
     text += &Texel::of(&samples.values).accessor();
     text += &shader::accessors(arrays);
-    [&text, shader::CELL, shader::REAL, STRETCH, CAST].join("\n")
-}
-
-/// What colours are functions of: a value of the same or another component, or components themselves.
-fn emission(components: usize) -> &'static str {
-    match components {
-        1 => {
-            "alias Moment = f32;
-fn emitting(color: u32, own: vec4f, u: f32, h: f32) -> array<Moment, 4> {
-    return array<Moment, 4>(own.x, own.y, own.z, own.w);
-}
-fn shown_by(line: Line, color: u32, sum: f32, moment: Moment) -> vec3f {
-    return line.value.yzw * sum + line.slope.yzw * moment;
-}
-fn values_at(u: f32) -> vec4f { return vec4f(); }
-"
-        }
-        2 => {
-            "alias Moment = f32;
-fn emitting(color: u32, own: vec4f, u: f32, h: f32) -> array<Moment, 4> {
-    let e = part_of(cubics[0], u, h);
-    return array<Moment, 4>(e.x - lines[color].start, e.y, e.z, e.w);
-}
-fn shown_by(line: Line, color: u32, sum: f32, moment: Moment) -> vec3f {
-    return lines[color].value.yzw * sum + lines[color].slope.yzw * moment;
-}
-fn values_at(u: f32) -> vec4f { return vec4f(value_of(cubics[0], u), 0.0, 0.0, 0.0); }
-"
-        }
-        _ => {
-            "alias Moment = vec3f;
-fn emitting(color: u32, own: vec4f, u: f32, h: f32) -> array<Moment, 4> {
-    let r = part_of(cubics[0], u, h);
-    let g = part_of(cubics[1], u, h);
-    let b = part_of(cubics[2], u, h);
-    return array<Moment, 4>(vec3f(r.x, g.x, b.x), vec3f(r.y, g.y, b.y), vec3f(r.z, g.z, b.z), vec3f(r.w, g.w, b.w));
-}
-fn shown_by(line: Line, color: u32, sum: f32, moment: Moment) -> vec3f { return moment * function.scale; }
-fn values_at(u: f32) -> vec4f {
-    return vec4f(value_of(cubics[0], u), value_of(cubics[1], u), value_of(cubics[2], u), 0.0);
-}
-"
-        }
-    }
+    [&text, shader::CELL, shader::REAL, stretch::STRETCH, CAST].join("\n")
 }
 
 #[cfg(test)]

@@ -1,8 +1,10 @@
 //! What a frame of a grid tells `shaders/cast.wgsl` of its view: rays in voxels, or along uneven axes.
 
-use super::lines::Map;
 use crate::cast::Volume;
 use crate::cast::volume::BLOCK;
+use crate::gpu::lines::Map;
+#[cfg(test)]
+use crate::gpu::offsets;
 use crate::gpu::rays::{self, FAR};
 use crate::view::{ClippingPlane, Fan, View};
 use bytemuck::{Pod, Zeroable};

@@ -7,7 +7,7 @@ use crate::cast::Volume;
 use crate::cast::lanes::tests::{Random, grid, transfer, typed, values, view};
 use crate::cast::ray::one_by_one;
 use crate::field::{Association, Component, Field, Kind};
-use crate::gpu::testing;
+use crate::gpu::{lines, testing};
 use crate::grid::{Grid, Lattice};
 use crate::integral::Exact;
 use crate::mesh::{Array, Values};

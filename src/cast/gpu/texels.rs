@@ -1,10 +1,10 @@
 //! A grid's values as devices hold them: in the file's own type where f32 holds that, else as f32.
 
-use super::lines::Map;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::arrays::INVISIBLE;
 use crate::gpu::buffers::Chunks;
+use crate::gpu::lines::Map;
 use crate::mesh::{Values, with_values};
 
 /// How values lie in the words of the array.

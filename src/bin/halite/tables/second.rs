@@ -70,6 +70,15 @@ pub(super) fn rows(
             let (size, bound) = (format!("{m}x{m}x{m}x{}", degree + 1), table.bound(exact));
             rows.push(Row { size, bytes: table.bytes(), build_ms, bound, ..row });
         }
+        let built = match device {
+            Some(device) => device.second_order_polynomial(degree, m, longest)?,
+            None => None,
+        };
+        if let Some((table, build_ms)) = built {
+            let row = row(name, "device".into(), &of_all, |(s, l)| table.look_up(s, l));
+            let (size, bound) = (format!("{m}x{m}x{m}x{}", degree + 1), table.bound(exact));
+            rows.push(Row { size, bytes: table.bytes(), build_ms, bound, ..row });
+        }
     }
     Ok(rows)
 }

@@ -294,14 +294,42 @@ fn slope_of(e: array<Moment, 4>, u: f32) -> Moment {
     return e[1] + u * (2.0 * e[2] + u * 3.0 * e[3]);
 }
 
+/// Whether means are asked for in the place of light: of extinction, and of colour by extinction and by length.
+var<private> takes_means: bool;
+var<private> mean_depth: f32;
+var<private> mean_by_depth: vec3f;
+var<private> mean_by_length: vec3f;
+
+/// Adds to means what lies along a part that is `size` long, on one line: all that is asked for is a polynomial of degree 6,
+/// for which the rule of five points is exact.
+fn add_means(line: Line, s: vec4f, size: f32) {
+    let places = array<f32, 5>(0.0, NODES.x, NODES.y, NODES.z, 1.0);
+    let weights = array<f32, 5>(END, WEIGHTS.x, WEIGHTS.y, WEIGHTS.z, END);
+    for (var k = 0u; k < 5u; k++) {
+        let offset = value_of(s, places[k]);
+        let depth = depth_at(line, offset, 1.0);
+        let color = line.value.yzw + line.slope.yzw * offset;
+        let weight = weights[k] * size;
+        mean_depth += weight * depth;
+        mean_by_depth += weight * depth * color;
+        mean_by_length += weight * color;
+    }
+}
+
 /// Adds the part of a voxel that is `size` long from `u` on, on which its value is on one line of opacity and one of
 /// colour, and begins with `s`; the voxel is `length` long.
 fn add_part(u: f32, size: f32, opacity: u32, color: u32, s: f32, length: f32) {
     let line = lines[opacity];
+    let a = cubics[COMPONENTS - 1u];
+    if MEANS && takes_means {
+        var own = part_of(a, u, size);
+        own.x = s - line.start;
+        add_means(line, own, size);
+        return;
+    }
     if (line.flags & SHOWS) == 0u {
         return;
     }
-    let a = cubics[COMPONENTS - 1u];
     var at = u;
     var rest = size;
     var value = s;
@@ -374,7 +402,8 @@ fn add_voxel(length: f32) {
     if PAIR {
         color_line = line_at(value_of(cubics[0], 1.0), true);
     }
-    if lines[last].shown - lines[first].shown + (lines[first].flags & SHOWS) == 0u {
+    let shown = lines[last].shown - lines[first].shown + (lines[first].flags & SHOWS);
+    if shown == 0u && !(MEANS && takes_means) {
         return;
     }
     if is_doubtful(first, last, bounds) {

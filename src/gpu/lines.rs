@@ -1,10 +1,12 @@
-//! The transfer function as `shaders/cast_stretch.wgsl` reads it: lines in f32, over values that are counted in the spread of
+//! The transfer function as `shaders/stretch.wgsl` reads it: lines in f32, over values that are counted in the spread of
 //! its knots.
 
+use super::Gpu;
+use super::buffers::Buffer;
+#[cfg(test)]
+use super::offsets;
 use crate::error::Result;
 use crate::field::Normalization;
-use crate::gpu::Gpu;
-use crate::gpu::buffers::Buffer;
 use crate::integral::{Exact, Knots, OPAQUE_EXTINCTION};
 use bytemuck::{Pod, Zeroable};
 use wgpu::BufferUsages as Usage;
@@ -15,10 +17,10 @@ const NARROW: f64 = 1e-5;
 const STEEP: [f64; 2] = [300.0, 1000.0];
 
 /// How far f32 may be off.
-pub(super) const OFF: f32 = 1e-6;
+pub(crate) const OFF: f32 = 1e-6;
 
 /// Parts of the knots' spread in which lines are looked for.
-pub(super) const BUCKETS: usize = 256;
+pub(crate) const BUCKETS: usize = 256;
 
 /// Greater numbers are for f64.
 const GREATEST: f64 = 1e18;
@@ -32,35 +34,35 @@ const FLAG_NARROW: u32 = 2;
 
 /// From an array's values to those that lines are over: `(v − mid) · factor`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Map {
-    pub(super) mid: f64,
-    pub(super) factor: f64,
+pub(crate) struct Map {
+    pub(crate) mid: f64,
+    pub(crate) factor: f64,
 }
 
 impl Map {
     /// Of a component that no function is over: as the field maps it.
-    pub(super) fn of(normal: Normalization) -> Self {
+    pub(crate) fn of(normal: Normalization) -> Self {
         Map { mid: normal.mid, factor: 1.0 / normal.half }
     }
 
     /// What it makes of `v`.
-    pub(super) fn apply(&self, v: f64) -> f64 {
+    pub(crate) fn apply(&self, v: f64) -> f64 {
         (v - self.mid) * self.factor
     }
 
     /// From what it makes of values to what `normal` makes of them: times the first, plus the second.
-    pub(super) fn back(&self, normal: Normalization) -> [f64; 2] {
+    pub(crate) fn back(&self, normal: Normalization) -> [f64; 2] {
         [1.0 / (self.factor * normal.half), (self.mid - normal.mid) / normal.half]
     }
 
     /// From what `self` makes of values to what another makes of them.
-    pub(super) fn then(&self, other: &Map) -> Map {
+    pub(crate) fn then(&self, other: &Map) -> Map {
         let factor = other.factor / self.factor;
         Map { mid: (other.mid - self.mid) * self.factor, factor }
     }
 
     /// Whether f32 holds it.
-    pub(super) fn is_in_reach(&self) -> bool {
+    pub(crate) fn is_in_reach(&self) -> bool {
         let holds = |v: f64| v == 0.0 || (v.abs() > 1e-30 && v.abs() < 1e30);
         self.factor.is_normal() && holds(self.factor) && holds(self.mid)
     }
@@ -69,7 +71,7 @@ impl Map {
 /// `Line` in the shader.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct Line {
+pub(crate) struct Line {
     value: [f32; 4],
     slope: [f32; 4],
     low: f32,
@@ -87,7 +89,7 @@ pub(super) struct Line {
 /// `Lines` in the shader.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct Ends {
+pub(crate) struct Ends {
     color: u32,
     end: u32,
     scale: f32,
@@ -104,12 +106,12 @@ struct Function {
 
 /// Those of a transfer function.
 #[derive(Debug)]
-pub(super) struct Lines {
+pub(crate) struct Lines {
     opacity: Function,
     color: Option<Function>,
     scale: f32,
     /// Whether extinction is the logarithm of a line.
-    pub(super) are_curved: bool,
+    pub(crate) are_curved: bool,
 }
 
 impl Function {
@@ -204,7 +206,7 @@ impl Function {
 impl Lines {
     /// Those of `exact` over values whose components `normal` maps, and which f32 holds if they are `plain`. Nothing if f32
     /// cannot hold the function.
-    pub(super) fn new(exact: &Exact<f64>, normal: &[Normalization; 4], plain: bool) -> Option<Self> {
+    pub(crate) fn new(exact: &Exact<f64>, normal: &[Normalization; 4], plain: bool) -> Option<Self> {
         let (knots, curved) = exact.curved.as_ref().map_or((&exact.opacity, None), |c| (&c.knots, Some(c.unit)));
         let components = exact.kind.components();
         // Emission of its own may show whatever the opacity is.
@@ -220,7 +222,7 @@ impl Lines {
     }
 
     /// The maps of the components.
-    pub(super) fn maps(&self, components: usize, normal: &[Normalization; 4]) -> [Map; 4] {
+    pub(crate) fn maps(&self, components: usize, normal: &[Normalization; 4]) -> [Map; 4] {
         let mut maps = normal.map(Map::of);
         if let Some(color) = &self.color {
             maps[0] = color.map;
@@ -230,7 +232,7 @@ impl Lines {
     }
 
     /// `function`, `lines` and `buckets`: bindings 0 to 2 of group 0.
-    pub(super) fn upload(&self, gpu: &Gpu) -> Result<[Buffer; 3]> {
+    pub(crate) fn upload(&self, gpu: &Gpu) -> Result<[Buffer; 3]> {
         let (mut lines, mut buckets) = (self.opacity.lines.clone(), self.opacity.buckets.clone());
         let color = lines.len() as u32;
         if let Some(of_color) = &self.color {
@@ -248,7 +250,7 @@ impl Lines {
 
 /// Where fields of [`Line`] and [`Ends`] are.
 #[cfg(test)]
-pub(super) const OFFSETS: &[(&str, usize)] =
+pub(crate) const OFFSETS: &[(&str, usize)] =
     &offsets!(Line: value, slope, low, high, start, curve, inner, shown, narrow, steps, flags, unused);
 #[cfg(test)]
-pub(super) const OFFSETS_OF_ENDS: &[(&str, usize)] = &offsets!(Ends: color, end, scale, unused);
+pub(crate) const OFFSETS_OF_ENDS: &[(&str, usize)] = &offsets!(Ends: color, end, scale, unused);
