@@ -3,8 +3,6 @@
 
 use super::Gpu;
 use super::buffers::Buffer;
-#[cfg(test)]
-use super::offsets;
 use crate::error::Result;
 use crate::field::Normalization;
 use crate::integral::{Exact, Knots, OPAQUE_EXTINCTION};
