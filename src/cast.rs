@@ -9,8 +9,10 @@
 //!
 //! It is the exact counterpart of the ray caster of El Hajjar, Marchesin, Dischler & Mongenet (Second Order Pre-integrated
 //! Volume Rendering, 2008), which follows such a field by quadratic polynomials: their orders are there by name
-//! ([`Reconstruction`]), with their tables in the place of integrals (`tabulated`). It runs on the CPU.
+//! ([`Reconstruction`]), with their tables in the place of integrals (`tabulated`). It runs on the CPU, and, but for tables and
+//! second variables, on graphics devices (`gpu`).
 
+pub(crate) mod gpu;
 mod gradient;
 mod histogram;
 mod lanes;

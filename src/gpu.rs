@@ -2,16 +2,26 @@
 //!
 //! Nothing here panics or aborts when a device fails: its first fault is kept, and `Gpu::check` tells it.
 
+/// Names of fields, and where they are.
+#[cfg(test)]
+macro_rules! offsets {
+    ($of:ty: $($field:ident),*) => { [$((stringify!($field), std::mem::offset_of!($of, $field))),*] };
+}
+#[cfg(test)]
+pub(crate) use offsets;
+
 pub(crate) mod arrays;
 pub(crate) mod buffers;
 pub(crate) mod clock;
 pub mod construct;
 pub(crate) mod function;
+pub(crate) mod lines;
 pub(crate) mod raster;
 pub(crate) mod rays;
 pub(crate) mod scene;
 pub(crate) mod shader;
 pub(crate) mod sort;
+pub(crate) mod stretch;
 pub(crate) mod table;
 #[cfg(test)]
 #[allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr, reason = "tests")]

@@ -17,6 +17,7 @@ mod stats;
 mod tables;
 
 use crate::cast::Reconstruction;
+use crate::cast::gpu::Caster;
 pub use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::field::{Field, Kind};
@@ -64,6 +65,8 @@ pub struct Renderer {
     stay: Stay,
     /// The grid that is drawn, in place of a mesh.
     grid: Option<LoadedGrid>,
+    /// What the device that draws holds of it.
+    caster: Caster,
     reconstruction: Reconstruction,
     field: Option<Prepared>,
     transfer: Option<TransferFunction>,
@@ -133,6 +136,7 @@ impl Renderer {
             mesh: None,
             stay: Stay::default(),
             grid: None,
+            caster: Caster::default(),
             reconstruction: Reconstruction::default(),
             field: None,
             transfer: None,
@@ -164,6 +168,7 @@ impl Renderer {
             Part::Function => self.extra.invalidate_function(),
             Part::Mesh | Part::Field | Part::Points => self.extra.invalidate_field(),
         }
+        self.caster.invalidate(part);
         self.backend.invalidate(part);
         self.backend.invalidate(Part::Function);
     }

@@ -49,11 +49,23 @@ fn renderers() -> Vec<(String, Renderer, DVec3, f64)> {
     let array = Array { name: "s".into(), components: 1, values: Values::F64(values) };
     let grid = Grid::regular(&Lattice { size: [6, 7, 8], ..Lattice::default() }, vec![array], vec![]).unwrap();
     let field = Field::new(&grid, "s", None, Component::Index(0)).unwrap();
-    let mut renderer = Renderer::with_device(2, DeviceChoice::Cpu).unwrap();
-    renderer.set_grid(&grid).unwrap();
-    renderer.set_field(&field).unwrap();
-    renderer.set_transfer(&transfer(&field));
-    all.push(("the caster".into(), renderer, DVec3::new(2.5, 3.0, 3.5), 3.5));
+    let name = std::env::var("HALITE_TEST_DEVICE").unwrap_or_else(|_| "0".into());
+    for device in [DeviceChoice::Cpu, DeviceChoice::Named(name)] {
+        let mut renderer = match Renderer::with_device(2, device.clone()) {
+            Ok(renderer) => renderer,
+            Err(e) => {
+                let required = std::env::var("HALITE_REQUIRE_GPU").is_ok_and(|v| v == "1");
+                assert!(device != DeviceChoice::Cpu && !required, "{e}");
+                eprintln!("skipped in part: there is no device: {e}");
+                continue;
+            }
+        };
+        renderer.set_grid(&grid).unwrap();
+        renderer.set_field(&field).unwrap();
+        renderer.set_transfer(&transfer(&field));
+        let name = format!("the caster on {}", renderer.stats().device);
+        all.push((name, renderer, DVec3::new(2.5, 3.0, 3.5), 3.5));
+    }
     all
 }
 

@@ -20,6 +20,9 @@ use std::path::Path;
 /// The reference takes the field for linear in 1024 pieces of a voxel.
 const BOUND: f64 = 5e-6;
 
+/// As devices agree with the CPU.
+const BOUND_ON_DEVICES: f64 = 2e-5;
+
 const SIZE: [usize; 3] = [7, 6, 8];
 
 fn array(name: &str, components: usize, values: Values) -> Array {
@@ -109,6 +112,32 @@ fn rebuilt(grid: &Grid, field: &Field, transfer: &TransferFunction, view: &View,
     image
 }
 
+/// A renderer on `HALITE_TEST_DEVICE`, or the first device. Without any there is none, which is said loudly; with
+/// `HALITE_REQUIRE_GPU=1` that is a failure.
+fn device() -> Option<Renderer> {
+    let name = std::env::var("HALITE_TEST_DEVICE").unwrap_or_else(|_| "0".into());
+    match Renderer::with_device(2, DeviceChoice::Named(name)) {
+        Ok(renderer) => Some(renderer),
+        Err(e) => {
+            assert!(!std::env::var("HALITE_REQUIRE_GPU").is_ok_and(|v| v == "1"), "{e}");
+            eprintln!("skipped: there is no device to test: {e}");
+            None
+        }
+    }
+}
+
+/// The greatest difference between the truth and the picture of a device, if there is one.
+fn off_on_device(grid: &Grid, field: &Field, transfer: &TransferFunction, view: &View, truth: &Image) -> Option<f64> {
+    let mut renderer = device()?;
+    renderer.set_grid(grid).unwrap();
+    renderer.set_field(field).unwrap();
+    renderer.set_transfer(transfer);
+    let image = renderer.render(view, &|_| {}).unwrap();
+    let by = if transfer.is_of_one_variable() { "gpu" } else { "cpu" };
+    assert_eq!((renderer.stats().engine.as_str(), renderer.stats().device.as_str()), ("grid", by));
+    Some(difference(&image, truth))
+}
+
 /// The greatest difference of two pictures, of which the second must show something.
 fn difference(a: &Image, b: &Image) -> f64 {
     let pairs = || a.pixels.as_flattened().iter().zip(b.pixels.as_flattened());
@@ -123,6 +152,10 @@ fn check(what: &str, grid: &Grid, field: &Field, transfer: &TransferFunction, vi
     let off = difference(&image(grid, field, transfer, view), &truth);
     eprintln!("{what}: {off:.1e}");
     assert!(off <= BOUND, "{what}: {off:.1e}");
+    if let Some(off) = off_on_device(grid, field, transfer, view, &truth) {
+        eprintln!("{what} on a device: {off:.1e}");
+        assert!(off <= BOUND_ON_DEVICES, "{what} on a device: {off:.1e}");
+    }
 }
 
 fn field(grid: &Grid, name: &str, component: Component) -> Field {
@@ -407,11 +440,13 @@ fn the_oracle_drew_the_same() {
         let read = Source::open(&scene.mesh).unwrap().read_data_set(0, &|_| ()).unwrap();
         let DataSet::Grid(grid) = read else { unreachable!("{name} is a grid") };
         let (view, _) = scene.view().unwrap();
-        let drawn = image(&grid, &scene.field(&grid).unwrap(), &scene.transfer, &view);
-        let off = difference(&drawn, &Image::open(&path.with_extension("npy")).unwrap());
-        eprintln!("{name}: {off:.1e}");
-        let bound = if name.ends_with("_light") { 5e-4 } else { BOUND };
+        let (field, truth) = (scene.field(&grid).unwrap(), Image::open(&path.with_extension("npy")).unwrap());
+        let off = difference(&image(&grid, &field, &scene.transfer, &view), &truth);
+        let off_there = off_on_device(&grid, &field, &scene.transfer, &view, &truth);
+        eprintln!("{name}: {off:.1e}, on a device {off_there:.1?}");
+        let [bound, there] = if name.ends_with("_light") { [5e-4; 2] } else { [BOUND, BOUND_ON_DEVICES] };
         assert!(off <= bound, "{name}: {off:.1e}");
+        assert!(off_there.is_none_or(|off| off <= there), "{name}: {off_there:.1?}");
         count += 1;
     }
     assert!(count >= 14, "{count} scenes only");

@@ -19,7 +19,7 @@ mod packet;
 mod passed;
 mod taken;
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;
 mod walk;
 
 use super::ray::{Frame, Visible, enter, least_light};

@@ -47,6 +47,22 @@ pub(crate) fn render(frame: &Frame) -> (Vec<[f32; 4]>, u64) {
     lanes::render(frame, &visible, &seen).unwrap_or_else(|| one_by_one(frame, &visible, &seen))
 }
 
+/// Draws single pixels of a frame, by their numbers, on the current rayon pool: ray by ray, in f64.
+pub(super) fn render_pixels(frame: &Frame, pixels: &[usize]) -> Vec<[f32; 4]> {
+    if pixels.is_empty() {
+        return vec![];
+    }
+    let opacity = &frame.exact.opacity;
+    let visible = &Visible::new(frame.exact, frame.samples.components);
+    let is_maximum = frame.view.blend() == Blend::Maximum;
+    let seen = &frame.samples.seen(|low, high| is_maximum || visible.shows(opacity.intervals(low, high)));
+    match frame.samples.components {
+        1 => Caster::<1> { frame, visible, seen }.pixels(pixels),
+        2 => Caster::<2> { frame, visible, seen }.pixels(pixels),
+        _ => Caster::<4> { frame, visible, seen }.pixels(pixels),
+    }
+}
+
 /// Draws a frame ray by ray, in f64: what there are no lanes for, and what tests judge these by.
 pub(super) fn one_by_one(frame: &Frame, visible: &Visible, seen: &[bool]) -> (Vec<[f32; 4]>, u64) {
     match frame.samples.components {
@@ -196,6 +212,13 @@ impl<const N: usize> Caster<'_, N> {
             (self.finished(&gathered), [gathered.steps, 0])
         });
         (pixels, steps)
+    }
+
+    /// The pixels of these numbers.
+    fn pixels(&self, pixels: &[usize]) -> Vec<[f32; 4]> {
+        let w = self.frame.view.size()[0] as usize;
+        let pixel = |&p: &usize| self.finished(&self.trace((p % w) as u32, (p / w) as u32));
+        pixels.par_iter().map(pixel).collect()
     }
 
     fn finished(&self, gathered: &Gathered<N>) -> [f32; 4] {

@@ -78,20 +78,35 @@ impl Chunks {
         source: &[S],
         convert: impl Fn(&S) -> T,
     ) -> Result<Self> {
+        Self::generated(gpu, label, source.len(), |i| convert(&source[i]))
+    }
+
+    /// An array of `count` elements, each as `element` makes it of its number.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub(crate) fn generated<T: NoUninit + Zeroable>(
+        gpu: &Gpu,
+        label: &str,
+        count: usize,
+        element: impl Fn(usize) -> T,
+    ) -> Result<Self> {
         let shift = (gpu.binding / size_of::<T>() as u64).max(1).ilog2().min(31);
         let mut buffers = Vec::new();
-        let mut slice = vec![T::zeroed(); (SLICE / size_of::<T>()).min(source.len())];
+        let mut slice = vec![T::zeroed(); (SLICE / size_of::<T>()).min(count)];
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
         // An empty array still needs something to bind.
-        let empty: &[S] = &[];
-        for chunk in source.chunks(1 << shift).chain(source.is_empty().then_some(empty)) {
-            let buffer = Buffer::new(gpu, label, size_of::<T>() as u64 * chunk.len() as u64, usage)?;
+        let starts = (0..count).step_by(1 << shift).chain((count == 0).then_some(0));
+        for start in starts {
+            let end = count.min(start + (1 << shift));
+            let buffer = Buffer::new(gpu, label, size_of::<T>() as u64 * (end - start) as u64, usage)?;
             let mut offset = 0;
-            for part in chunk.chunks(slice.len().max(1)) {
-                for (to, from) in slice.iter_mut().zip(part) {
-                    *to = convert(from);
+            for from in (start..end).step_by(slice.len().max(1)) {
+                let length = slice.len().min(end - from);
+                for (i, to) in (from..).zip(&mut slice[..length]) {
+                    *to = element(i);
                 }
-                let bytes: &[u8] = bytemuck::cast_slice(&slice[..part.len()]);
+                let bytes: &[u8] = bytemuck::cast_slice(&slice[..length]);
                 buffer.write(gpu, offset, bytes);
                 offset += bytes.len() as u64;
                 if offset % (8 * SLICE as u64) == 0 {

@@ -3,6 +3,8 @@
 //! A `Plan` says what is dispatched for a table; `TableBuilder` does it, and leaves the texels on the device. What draws
 //! copies them into its texture there (`table`), and [`Constructor`] hands them back, to be compared.
 
+mod second_order;
+
 use super::buffers::Buffer;
 use super::raster::{self, Readback, Slot};
 use super::shader::{self, ShaderVariant};

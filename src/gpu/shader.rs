@@ -5,7 +5,9 @@ use crate::integral::{BUCKETS, OPAQUE_DEPTH, OPAQUE_EXTINCTION, SERIES_DEPTH};
 use std::fmt::Write;
 
 pub(crate) const CELL: &str = include_str!("../../shaders/cell.wgsl");
-pub(crate) const INTEGRAL: &str = include_str!("../../shaders/integral.wgsl");
+pub(crate) const REAL: &str = include_str!("../../shaders/real.wgsl");
+pub(crate) const INTEGRAL: &str =
+    concat!(include_str!("../../shaders/real.wgsl"), "\n", include_str!("../../shaders/integral.wgsl"));
 
 /// What a program is compiled for.
 #[derive(Debug, Clone, PartialEq, Eq)]

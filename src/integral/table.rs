@@ -34,6 +34,7 @@ pub use volume::{Kind, Table, coordinate, length};
 pub(crate) use grid::Nodes;
 pub(crate) use polynomial::{THINNEST, inverse};
 pub(crate) use sampled::entries;
+pub(crate) use second_order::{Slices, samples, span};
 pub(crate) use volume::OPAQUE_DEPTH;
 
 use super::{Exact, Light};

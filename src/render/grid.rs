@@ -1,5 +1,6 @@
-//! Frames of regular and rectilinear grids: by the ray caster, on the CPU, whatever the renderer's engine and device are.
+//! Frames of regular and rectilinear grids: by the ray caster, whatever the renderer's engine is, on its device.
 
+mod device;
 mod second;
 
 use super::largest::Largest;
@@ -25,6 +26,8 @@ use std::time::Instant;
 pub(super) struct LoadedGrid {
     volume: Volume,
     field: Option<OnGrid>,
+    /// The device was said to lack digits for it.
+    is_fine: bool,
 }
 
 /// The field that is drawn of it.
@@ -90,8 +93,8 @@ impl OnGrid {
 }
 
 impl Renderer {
-    /// Draws a regular or rectilinear grid from now on; the field must be set again. Whatever the engine and the device are,
-    /// the CPU's ray caster draws it.
+    /// Draws a regular or rectilinear grid from now on; the field must be set again. Whatever the engine is, the ray caster
+    /// draws it, on the renderer's device: on the CPU with tables, a second variable or light.
     ///
     /// # Errors
     /// [`Error::Empty`] if none of its cells can be drawn.
@@ -102,11 +105,7 @@ impl Renderer {
         self.invalidate(Part::Mesh);
         (self.stats.cells, self.stats.tetrahedra) = (volume.cell_count() as u64, 0);
         self.stats.faces_ms = ms(start);
-        if let Some(gpu) = self.backend.gpu() {
-            let name = &gpu.adapter.name;
-            tracing::warn!("regular and rectilinear grids are drawn by the CPU's ray caster, not yet on {name}");
-        }
-        self.grid = Some(LoadedGrid { volume, field: None });
+        self.grid = Some(LoadedGrid { volume, field: None, is_fine: false });
         self.name_device();
         Ok(())
     }
@@ -130,19 +129,13 @@ impl Renderer {
         image.pixels.iter_mut().for_each(|p| *p = largest.of_values(*p));
     }
 
-    /// What draws grids.
-    pub(super) fn name_caster(&mut self) {
-        self.stats.engine = "grid".into();
-        (self.stats.device, self.stats.adapter) =
-            ("cpu".into(), format!("{} threads", self.pool.current_num_threads()));
-    }
-
     /// Draws another field of the grid from now on.
     pub(super) fn set_grid_field(&mut self, field: &Field) -> Result<()> {
         let start = Instant::now();
         let Some(grid) = &mut self.grid else { return Err(Error::Render("a field needs a grid first".into())) };
         let samples = self.pool.install(|| Samples::new(&grid.volume, field))?;
         self.stats.device_bytes = grid.volume.bytes() + samples.bytes();
+        self.caster.invalidate(Part::Field);
         let normal = [0, 1, 2, 3].map(|k| field.normal(k));
         let chooser = Chooser::new(field);
         grid.field =
@@ -158,6 +151,7 @@ impl Renderer {
         let start = Instant::now();
         let missing = |what: &str| Error::Render(format!("there is no {what} to draw"));
         let reconstruction = self.reconstruction;
+        self.name_caster();
         let steps = matches!(reconstruction.sampling, Sampling::Steps(_));
         tabulated::check(self.integral.form, reconstruction.order, steps)?;
         let grid = self.grid.as_mut().ok_or_else(|| missing("grid"))?;
@@ -210,26 +204,43 @@ impl Renderer {
             pixel: &pixel,
             progress,
         };
-        let (pixels, steps, panels) = if of_two {
-            let (pixels, [steps, panels]) = self.pool.install(|| field.extra.draw(&frame, &field.field, transfer))?;
-            (pixels, steps, panels)
-        } else {
-            let (pixels, steps) = self.pool.install(|| cast::render(&frame));
-            (pixels, steps, 0)
+        let on_device = match self.backend.gpu().filter(|_| self.lacking.is_none()) {
+            Some(gpu) => device::draw(&mut self.caster, gpu, &frame, &self.pool, &mut self.stats)?,
+            None => None,
         };
+        let is_fine = on_device.is_none() && self.lacking.is_none() && self.backend.gpu().is_some();
+        let pixels = match on_device {
+            Some(pixels) => pixels,
+            None => {
+                let (pixels, [steps, panels]) = self.pool.install(|| match of_two {
+                    true => field.extra.draw(&frame, &field.field, transfer),
+                    false => Ok({
+                        let (pixels, steps) = cast::render(&frame);
+                        (pixels, [steps, 0])
+                    }),
+                })?;
+                let stats = &mut self.stats;
+                stats.device_bytes = grid.volume.bytes() + field.samples.bytes() + field.extra.bytes();
+                (stats.steps, stats.panels, stats.cpu_rays) = (steps, panels, 0);
+                (stats.device_ms, stats.uploaded_bytes) = (None, 0);
+                pixels
+            }
+        };
+        let said = std::mem::replace(&mut grid.is_fine, is_fine);
         let stats = &mut self.stats;
-        stats.panels = panels;
-        stats.device_bytes = grid.volume.bytes() + field.samples.bytes() + field.extra.bytes();
-        (stats.steps, stats.retraced_rays, stats.cpu_rays) = (steps, 0, 0);
+        stats.retraced_rays = 0;
         let own = if of_two { self.integral.two.method.name() } else { Form::Exact.name() };
         stats.integral = built.as_ref().map_or(own, |b| b.table.options().form.name()).into();
         stats.table_ms = built.as_ref().map_or(0.0, |b| b.ms);
         stats.table_bytes = built.as_ref().map_or(0, |b| b.table.bytes());
-        (stats.device_ms, stats.projection, stats.sweep, stats.uploaded_bytes) = (None, None, None, 0);
+        (stats.projection, stats.sweep) = (None, None);
         stats.frame_ms = ms(start);
         self.waits = false;
         if let Some(key) = key.filter(|_| built.is_none()) {
             self.tables.start(&key, &self.pool)?;
+        }
+        if is_fine {
+            self.name_fine(said);
         }
         Ok(Image { size: view.size(), pixels })
     }

@@ -2,6 +2,7 @@
 
 use super::backend::Backend;
 use super::{Progress, Renderer};
+use crate::cast::gpu::Caster;
 use crate::error::{Error, Result};
 use crate::gpu::DeviceChoice;
 use crate::image::Image;
@@ -20,6 +21,7 @@ impl Renderer {
         match self.try_render(view, progress) {
             Err(Error::Lost(why)) => {
                 tracing::warn!("{why}; opening it again");
+                self.caster = Caster::default();
                 match Backend::open(self.engine, &self.choice) {
                     Ok(backend) => self.backend = backend,
                     Err(_) if self.backend.may_fall_back() => self.backend = Backend::without_device(self.engine),
@@ -47,6 +49,7 @@ impl Renderer {
     /// Draws on the CPU from now on.
     pub(crate) fn draw_on_cpu(&mut self, why: &Error) {
         tracing::warn!("{why}; now drawing on the CPU");
+        self.caster = Caster::default();
         self.backend = Backend::without_device(self.engine);
         self.name_device();
     }

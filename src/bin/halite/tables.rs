@@ -140,7 +140,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
                 progress(i as f64 / count);
                 rows.extend(row(form, &truth)?);
             }
-            rows.extend(second::rows(&exact, longest, options.values, options.segments));
+            rows.extend(second::rows(&exact, constructor.as_ref(), longest, options.values, options.segments)?);
             Ok(rows)
         })?;
         output::print(&text(&rows))?;

@@ -16,29 +16,29 @@ use std::ops::ControlFlow;
 /// What pictures may be off: f32 sums along rays.
 const BOUND: f32 = 5e-6;
 
-struct Random(u64);
+pub(in crate::cast) struct Random(pub(in crate::cast) u64);
 
 impl Random {
-    fn next(&mut self) -> f64 {
+    pub(in crate::cast) fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    fn within(&mut self, low: f64, high: f64) -> f64 {
+    pub(in crate::cast) fn within(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.next()
     }
 
-    fn below(&mut self, n: usize) -> usize {
+    pub(in crate::cast) fn below(&mut self, n: usize) -> usize {
         (self.next() * n as f64) as usize
     }
 
-    fn point(&mut self, most: f64) -> DVec3 {
+    pub(in crate::cast) fn point(&mut self, most: f64) -> DVec3 {
         DVec3::new(self.within(-most, most), self.within(-most, most), self.within(-most, most))
     }
 }
 
 /// Values in [0, 1]: noise, a wave, or `plateaus`.
-fn values(random: &mut Random, count: usize, row: usize, plateaus: bool) -> Vec<f64> {
+pub(in crate::cast) fn values(random: &mut Random, count: usize, row: usize, plateaus: bool) -> Vec<f64> {
     let (kind, long) = (random.below(if plateaus { 3 } else { 2 }), random.within(0.05, 0.6));
     (0..count)
         .map(|i| {
@@ -53,7 +53,7 @@ fn values(random: &mut Random, count: usize, row: usize, plateaus: bool) -> Vec<
 }
 
 /// The same in some type, and what 0 and 1 became.
-fn typed(random: &mut Random, values: &[f64]) -> (Values, [f64; 2]) {
+pub(in crate::cast) fn typed(random: &mut Random, values: &[f64]) -> (Values, [f64; 2]) {
     let scaled = |low: f64, high: f64| values.iter().map(move |v| low + (high - low) * v);
     match random.below(7) {
         0 => (Values::U8(scaled(0.0, 255.0).map(|v| v as u8).collect()), [0.0, 255.0]),
@@ -66,7 +66,7 @@ fn typed(random: &mut Random, values: &[f64]) -> (Values, [f64; 2]) {
     }
 }
 
-fn grid(random: &mut Random, plateaus: bool) -> (Grid, Field, [f64; 2]) {
+pub(in crate::cast) fn grid(random: &mut Random, plateaus: bool) -> (Grid, Field, [f64; 2]) {
     let size = [0; 3].map(|_| 2 + random.below(19));
     let of_cells = random.below(4) == 0;
     let dimensions = if of_cells { size.map(|n| n - 1) } else { size };
@@ -110,7 +110,7 @@ fn grid(random: &mut Random, plateaus: bool) -> (Grid, Field, [f64; 2]) {
     (grid, field, ends)
 }
 
-fn transfer(random: &mut Random, [low, high]: [f64; 2]) -> TransferFunction {
+pub(in crate::cast) fn transfer(random: &mut Random, [low, high]: [f64; 2]) -> TransferFunction {
     let place = |u: f64| low + (high - low) * u;
     let count = 2 + random.below(9);
     let mut places: Vec<f64> = (0..count).map(|_| random.within(-0.1, 1.1)).collect();
@@ -136,7 +136,7 @@ fn transfer(random: &mut Random, [low, high]: [f64; 2]) -> TransferFunction {
     if random.below(4) == 0 { transfer.with_emission(Emission::Direct { scale: 0.5 }).unwrap() } else { transfer }
 }
 
-fn view(random: &mut Random) -> View {
+pub(in crate::cast) fn view(random: &mut Random) -> View {
     let inside = random.below(4) == 0;
     let position = if inside { random.point(0.3) } else { random.point(1.0).normalize() * 4.0 };
     // Along the axes of what is not turned, too.
@@ -156,7 +156,7 @@ fn view(random: &mut Random) -> View {
 }
 
 /// Draws a frame in some way: what is seen of it is known then.
-fn drawn<T>(
+pub(in crate::cast) fn drawn<T>(
     (grid, field): (&Grid, &Field),
     transfer: &TransferFunction,
     view: &View,

@@ -29,25 +29,25 @@ const FAINT: f32 = 0.1;
 const STRAIGHT: f32 = 1e-6;
 
 /// Terms of −ln(1 − w)/w for w up to a little above [`MOST_OF_PART`], to 1e-7 of itself.
-const LOGARITHM: [f32; 8] =
+pub(crate) const LOGARITHM: [f32; 8] =
     [1.0, 0.500_000_2, 0.333_297_95, 0.251_321, 0.181_874_4, 0.281_617_58, -0.211_392_15, 0.596_919_96];
 
 /// By how much of itself what passes may change along a stretch at most, and the square of that times the part of its bend,
 /// so that the polynomial through five points is the logarithm to 1e-6; and for three points.
-const MOST: f32 = 0.5;
-const MOST_BENT: f32 = 1e-3;
+pub(crate) const MOST: f32 = 0.5;
+pub(crate) const MOST_BENT: f32 = 1e-3;
 const LITTLE: f32 = 0.1;
 
 /// Steps in which a depth of any size becomes a small one.
 const TRIES: usize = 30;
 
 /// Inner nodes in [0, 1], and weights, of the Gauss–Lobatto rule of five points, and the ends' weight.
-const NODES: [f32; 3] = [0.172_673_16, 0.5, 0.827_326_84];
-const WEIGHTS: [f32; 3] = [49.0 / 180.0, 16.0 / 45.0, 49.0 / 180.0];
-const END: f32 = 1.0 / 20.0;
+pub(crate) const NODES: [f32; 3] = [0.172_673_16, 0.5, 0.827_326_84];
+pub(crate) const WEIGHTS: [f32; 3] = [49.0 / 180.0, 16.0 / 45.0, 49.0 / 180.0];
+pub(crate) const END: f32 = 1.0 / 20.0;
 
 /// Integrals, from 0 to each inner node, of the polynomials that are 1 at one of the five points and 0 at the others.
-const UP_TO: [[f32; 5]; 3] = [
+pub(crate) const UP_TO: [[f32; 5]; 3] = [
     [0.067_728_43, 0.119_744_77, -0.021_735_722, 0.010_635_824, -0.003_700_139_2],
     [0.040_625, 0.303_184_18, 0.177_777_78, -0.030_961_96, 0.009_375],
     [0.053_700_14, 0.261_586_4, 0.377_291_3, 0.152_477_45, -0.017_728_432],

@@ -25,10 +25,10 @@ use crate::integral::cubic::Cubic;
 use crate::integral::{Exact, Light};
 use parabolas::Parabolas;
 use rayon::prelude::*;
-use slices::Slices;
+pub(crate) use slices::Slices;
 
 /// How far parabolas reach through samples in [−1, 1].
-const REACH: f64 = 1.25;
+pub(crate) const REACH: f64 = 1.25;
 
 /// The greatest slope of such.
 const STEEPEST: f64 = 8.0;
@@ -89,7 +89,7 @@ pub struct SecondOrderPolynomial {
 }
 
 /// The samples of texel `at` of size³.
-fn samples(at: usize, size: u32) -> [f64; 3] {
+pub(crate) fn samples(at: usize, size: u32) -> [f64; 3] {
     let n = size as usize;
     [at % n, at / n % n, at / (n * n)].map(|i| value(i as u32, size))
 }
@@ -131,7 +131,7 @@ impl Slabs {
 }
 
 /// What 255 stands for in the colours of slabs of this length.
-fn span(exact: &Exact<f64>, length: f64) -> f32 {
+pub(crate) fn span(exact: &Exact<f64>, length: f64) -> f32 {
     let brightest = exact.opacity.value.iter().flat_map(|v| &v[1..]).fold(0.0, |most: f64, c| most.max(*c));
     (if exact.direct { brightest * length } else { brightest }).max(1.0) as f32
 }
@@ -240,36 +240,39 @@ impl SecondOrderPolynomial {
         let inverse = inverse(degree as usize);
         let made: Vec<[[f32; 4]; 5]> = (0..(size as usize).pow(3))
             .into_par_iter()
-            .map(|at| {
-                let parabola = Cubic::parabola(samples(at, size));
-                let (density, limit) = exact.means(&parabola);
-                // The first is the limit for short slabs: the mean colour by its share of the extinction.
-                let points: Vec<[f64; 3]> = (0..=degree)
-                    .map(|i| match i {
-                        0 => limit,
-                        _ => {
-                            let l = longest * f64::from(i) / f64::from(degree);
-                            let mut light = Light::none();
-                            exact.add_cubic(&parabola, l, |_| true, &mut light);
-                            let seen = reconstructed([1.0; 3], density, l, exact.direct)[0];
-                            if seen > 0.0 { light.color.map(|c| c / seen) } else { limit }
-                        }
-                    })
-                    .collect();
-                let mut coefficients = [[0.0; 4]; 5];
-                for (i, of) in coefficients.iter_mut().enumerate().take(points.len()) {
-                    for k in 0..3 {
-                        of[k] = points.iter().zip(&inverse[i]).map(|(p, w)| p[k] * w).sum::<f64>() as f32;
-                    }
-                }
-                coefficients[0][3] = density as f32;
-                coefficients
-            })
+            .map(|at| Self::texel(exact, &inverse, samples(at, size), longest))
             .collect();
         for (i, of) in table.texels.iter_mut().enumerate() {
             of.iter_mut().zip(&made).for_each(|(texel, made)| *texel = made[i]);
         }
         Some(table)
+    }
+
+    /// Coefficients of a texel of these samples; `inverse` makes them of points.
+    pub(crate) fn texel(exact: &Exact<f64>, inverse: &[Vec<f64>], samples: [f64; 3], longest: f64) -> [[f32; 4]; 5] {
+        let (parabola, degree) = (Cubic::parabola(samples), inverse.len() - 1);
+        let (density, limit) = exact.means(&parabola);
+        // The first is the limit for short slabs: the mean colour by its share of the extinction.
+        let points: Vec<[f64; 3]> = (0..=degree)
+            .map(|i| match i {
+                0 => limit,
+                _ => {
+                    let l = longest * i as f64 / degree as f64;
+                    let mut light = Light::none();
+                    exact.add_cubic(&parabola, l, |_| true, &mut light);
+                    let seen = reconstructed([1.0; 3], density, l, exact.direct)[0];
+                    if seen > 0.0 { light.color.map(|c| c / seen) } else { limit }
+                }
+            })
+            .collect();
+        let mut coefficients = [[0.0; 4]; 5];
+        for (i, of) in coefficients.iter_mut().enumerate().take(points.len()) {
+            for k in 0..3 {
+                of[k] = points.iter().zip(&inverse[i]).map(|(p, w)| p[k] * w).sum::<f64>() as f32;
+            }
+        }
+        coefficients[0][3] = density as f32;
+        coefficients
     }
 
     /// The same table, to f32, in a fraction of the time (`parabolas.rs` says how).

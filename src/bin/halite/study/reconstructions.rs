@@ -90,7 +90,9 @@ pub(super) fn run(options: &Options, threads: usize) -> Result<()> {
     let random = semi_random(&mut plots, &mut text);
     let long = steps(&volumes, &mut plots, &mut text);
     let turns = turns(&volumes, &mut text);
-    let pictures = progress::during("drawing", |report| pictures::draw(&volumes, threads, options.frames, report))?;
+    let device = options.request.device(None).or_environment();
+    let pictures =
+        progress::during("drawing", |report| pictures::draw(&volumes, threads, options.frames, &device, report))?;
     text += &pictures.text();
     output::print(&text)?;
     plot::sheet(&plots, &pictures).save(&options.out, Backdrop::Color([0.0; 3]))?;

@@ -1,6 +1,8 @@
 //! Second-order tables, over slabs of three samples.
 
 use super::Row;
+use anyhow::Result;
+use halite::gpu::construct::Constructor;
 use halite::integral::Exact;
 use halite::integral::table::{SecondOrder, SecondOrderLengths, SecondOrderPolynomial, parabola};
 use rayon::prelude::*;
@@ -18,8 +20,15 @@ const DEGREES: [(&str, u32); 2] = [("second order, degree 1", 1), ("second order
 /// A slab: its samples and its length.
 type Slab = ([f64; 3], f64);
 
-/// The tables that were built, with so many `values` along each axis at most, and their errors over `count` slabs.
-pub(super) fn rows(exact: &Exact<f64>, longest: f64, values: u32, count: u32) -> Vec<Row> {
+/// The tables that were built, also on a device if there is one, with so many `values` along each axis at most, and their
+/// errors over `count` slabs.
+pub(super) fn rows(
+    exact: &Exact<f64>,
+    device: Option<&Constructor>,
+    longest: f64,
+    values: u32,
+    count: u32,
+) -> Result<Vec<Row>> {
     let [n, m, few] = MOST.map(|most| most.min(values));
     let mut rows = vec![];
     let of_one = slabs(exact, count, |_| longest);
@@ -33,6 +42,15 @@ pub(super) fn rows(exact: &Exact<f64>, longest: f64, values: u32, count: u32) ->
                 row("second order, 1 length", format!("{construction}{bits}"), &of_one, |(s, _)| table.look_up(s));
             let bound = bits.is_empty().then(|| table.bound(exact));
             rows.push(Row { size: format!("{n}x{n}x{n}"), bytes: table.bytes(), build_ms, bound, ..row });
+            let built = match device {
+                Some(device) => device.second_order(n, longest, iterations, !bits.is_empty())?,
+                None => None,
+            };
+            if let Some((table, build_ms)) = built {
+                let construction = format!("device, {construction}{bits}");
+                let row = self::row("second order, 1 length", construction, &of_one, |(s, _)| table.look_up(s));
+                rows.push(Row { size: format!("{n}x{n}x{n}"), bytes: table.bytes(), build_ms, bound, ..row });
+            }
         }
     }
     let of_all = slabs(exact, count, |share| longest * share);
@@ -52,8 +70,17 @@ pub(super) fn rows(exact: &Exact<f64>, longest: f64, values: u32, count: u32) ->
             let (size, bound) = (format!("{m}x{m}x{m}x{}", degree + 1), table.bound(exact));
             rows.push(Row { size, bytes: table.bytes(), build_ms, bound, ..row });
         }
+        let built = match device {
+            Some(device) => device.second_order_polynomial(degree, m, longest)?,
+            None => None,
+        };
+        if let Some((table, build_ms)) = built {
+            let row = row(name, "device".into(), &of_all, |(s, l)| table.look_up(s, l));
+            let (size, bound) = (format!("{m}x{m}x{m}x{}", degree + 1), table.bound(exact));
+            rows.push(Row { size, bytes: table.bytes(), build_ms, bound, ..row });
+        }
     }
-    rows
+    Ok(rows)
 }
 
 /// Slabs along four additive sequences (Roberts 2018), and what they do.

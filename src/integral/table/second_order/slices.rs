@@ -18,7 +18,7 @@ const ROOM: usize = 4096;
 const WHOLE: f32 = (1u32 << 23) as f32;
 
 /// What slices do by their value: red, green, blue and opacity, from the least value that a parabola reaches to the greatest.
-pub(super) struct Slices {
+pub(crate) struct Slices {
     entries: Box<[[f32; 4]; ROOM]>,
     last: usize,
     /// Entries for each normalised unit.
@@ -29,7 +29,7 @@ pub(super) struct Slices {
 
 impl Slices {
     /// Of slabs of `length` in so many `iterations`, for a table of `size` texels along each axis.
-    pub(super) fn new(exact: &Exact<f64>, size: u32, length: f64, iterations: u32) -> Self {
+    pub(crate) fn new(exact: &Exact<f64>, size: u32, length: f64, iterations: u32) -> Self {
         // Between two texels are as many entries as let each texel's value have one, by a multiple of 8.
         let between_texels = 8 * ENTRIES.div_ceil(10 * (size - 1));
         let per_unit = f64::from((size - 1) * between_texels) / 2.0;
@@ -40,6 +40,11 @@ impl Slices {
         let last = last.min(ROOM - 1);
         entries[..=last].par_iter_mut().enumerate().for_each(|(i, entry)| *entry = of_value(i));
         Slices { entries, last, per_unit: per_unit as f32, size, iterations }
+    }
+
+    /// What slices do by their value, entries for each normalised unit.
+    pub(crate) fn entries(&self) -> (&[[f32; 4]], f32) {
+        (&self.entries[..=self.last], self.per_unit)
     }
 
     /// How far an entry may be from the value that it stands for.
