@@ -10,6 +10,7 @@ pub(crate) mod function;
 pub(crate) mod raster;
 pub(crate) mod rays;
 pub(crate) mod scene;
+pub(crate) mod second;
 pub(crate) mod shader;
 pub(crate) mod sort;
 pub(crate) mod table;

@@ -73,7 +73,7 @@ pub struct Renderer {
     /// The projection on the CPU that draws that in the place of a device's.
     sweep: Option<Box<Sweep>>,
     /// The engine that was said to draw neither.
-    lacking: Option<&'static str>,
+    lacking: Option<String>,
     integral: IntegrationOptions,
     tables: Tables,
     /// What of a table is needed, once that is known: none for the exact integral.
@@ -183,6 +183,7 @@ impl Renderer {
             self.extra.invalidate_function();
             self.grid.iter_mut().for_each(LoadedGrid::invalidate_function);
             (self.key, self.waits, self.host_builds) = (None, integral.form != Form::Auto, false);
+            self.name_device();
         }
     }
 

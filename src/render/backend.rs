@@ -6,14 +6,17 @@ use super::stats::{ProjectionStats, SweepStats};
 use crate::error::{Error, Result};
 use crate::geometry::{TetMesh, Values};
 use crate::gpu::scene::DeviceScene;
+use crate::gpu::second::SecondScene;
 use crate::gpu::{DeviceChoice, Gpu, Part};
-use crate::integral::{Exact, Integral, PreintegratedTable};
+use crate::integral::options::Two;
+use crate::integral::{Exact, Integral, PreintegratedTable, second};
 use crate::project::cpu::{self as sweep, Sweep};
 use crate::project::{self, ProjectionOptions, gpu::Project};
 use crate::render::Engine;
+use crate::transfer::TransferFunction;
 use crate::traverse::cpu;
-use crate::traverse::gpu::Traverse;
-use crate::view::Blend;
+use crate::traverse::gpu::{Traverse, WalkedFrame};
+use crate::view::{Blend, View};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -135,12 +138,16 @@ impl Backend {
         matches!(self, Backend::WalkOnDevice(_))
     }
 
-    /// What cannot draw a second variable or light; none if it can.
-    pub(super) fn lacks_second(&self) -> Option<&'static str> {
+    /// What of a second variable, light or silhouettes it cannot draw of `transfer`, integrated as `two` says; none if all.
+    pub(super) fn lacks_second(&self, transfer: &TransferFunction, two: &Two) -> Option<String> {
         match self {
             Backend::Walk | Backend::Project(_) => None,
-            Backend::WalkOnDevice(_) => Some("the walk on a device"),
-            Backend::ProjectOnDevice(_) => Some("the projection on a device"),
+            Backend::WalkOnDevice(_) => {
+                second::lacks(transfer, two).map(|what| format!("the walk on a device lacks {what}"))
+            }
+            Backend::ProjectOnDevice(_) => {
+                Some("the projection on a device draws neither a second variable nor light yet".into())
+            }
         }
     }
 
@@ -205,6 +212,27 @@ impl Backend {
             Backend::WalkOnDevice(traverse) => walk_on(traverse, frame, values),
             Backend::Project(sweep) => project_by(sweep, frame, values),
             Backend::ProjectOnDevice(project) => project_on(project, frame, values),
+        }
+    }
+
+    /// Draws a frame of two variables, or with light, on the device, of which nothing is [lacking](Self::lacks_second); and says
+    /// which pixels are left to the CPU.
+    pub(super) fn draw_second<const N: usize>(
+        &mut self,
+        geometry: &TetMesh,
+        scene: &SecondScene<N>,
+        even: &Exact<f32>,
+        view: &View,
+    ) -> Result<(DrawnFrame, Vec<usize>)> {
+        match self {
+            Backend::Walk | Backend::Project(_) | Backend::ProjectOnDevice(_) => {
+                Err(Error::Device("there is no device that draws two variables".into()))
+            }
+            Backend::WalkOnDevice(traverse) => {
+                let WalkedFrame { pixels, counts, device_ms } = traverse.render_second(geometry, scene, even, view)?;
+                let left = Traverse::unfinished(&pixels);
+                Ok((DrawnFrame { pixels, counts, device_ms, ..DrawnFrame::default() }, left))
+            }
         }
     }
 }
