@@ -114,6 +114,8 @@ fn logarithms(x: vec3f) -> vec3f {
 //#if LOGARITHMIC
 /// What is left of 1 by an opacity, as far as f32 tells it: places where a function is as good as 1 are no longer than that.
 const LEAST_LEFT = 2e-7;
+/// By what factor what is left of 1 changes in a panel: its logarithm is off by 5e-6 of the panel's length then.
+const EVEN = 2.0;
 /// Extinction times the unit distance of what is opaque.
 const SOLID = 1e8;
 /// Lengths of panels, over the unit distance and as shares of a segment, in which logarithms may do what they will.
@@ -233,7 +235,7 @@ var<private> shown: u32;
 var<private> boxed: u32;
 var<private> turning: u32;
 
-const UNIFORM = 0.0;
+const CONSTANT = 0.0;
 const GAUSSIAN = 1.0;
 const TRIANGLE = 2.0;
 const ABSOLUTE = 3.0;
@@ -264,7 +266,7 @@ fn fractions(p: vec3f) -> vec3f {
 /// Shares of the greatest opacity at (s, g), whether in the widget's box or not.
 fn heights(k: u32, s: vec3f, g: vec3f) -> vec3f {
     let head = rows[WIDGET * k];
-    if head.x == UNIFORM {
+    if head.x == CONSTANT {
         return vec3f(1.0);
     }
     let form = rows[WIDGET * k + 2u];
@@ -326,7 +328,7 @@ fn find_widgets() -> f32 {
             boxed |= bit;
         }
         let kind = rows[WIDGET * k].x;
-        if kind == UNIFORM {
+        if kind == CONSTANT {
             continue;
         }
         let form = rows[WIDGET * k + 2u];
@@ -442,7 +444,7 @@ fn closed() -> vec4f {
     var mean = 1.0;
     if head.x == GAUSSIAN {
         mean = gaussian_mean(rows[WIDGET * k + 2u], at, rise);
-    } else if head.x != UNIFORM {
+    } else if head.x != CONSTANT {
         let form = rows[WIDGET * k + 2u];
         if abs(fma(rise.x, form.x, rise.y * form.y)) < LONG {
             return vec4f(0.0, 0.0, 0.0, 2.0 * LEFT);
@@ -503,7 +505,7 @@ fn nodes_at(u: vec3f, middle: f32) -> Nodes {
         }
         var a = heights(k, s, g) * rows[WIDGET * k].y;
         //#if LOGARITHMIC
-        if rows[WIDGET * k].x != UNIFORM {
+        if rows[WIDGET * k].x != CONSTANT {
             // A peak is that high at a point only.
             a = min(a, vec3f(1.0 - 6e-8));
         }
@@ -715,8 +717,8 @@ fn of_stretch() -> vec4f {
         let most = max(max(n.most.x, n.most.y), n.most.z);
         let least = min(min(n.most.x, n.most.y), n.most.z);
         // Gauss's rule is off by 5 % of the unit of depth where a logarithm is infinite at an end of a panel.
-        let is_even = max(1.0 - least, LEAST_LEFT) <= max(1.0 - most, LEAST_LEFT) * FACTOR;
-        tame = tame && (is_even || h <= max(THIN_PANEL.x / absorbing, THIN_PANEL.y));
+        let ratio = max(1.0 - least, LEAST_LEFT) / max(1.0 - most, LEAST_LEFT);
+        tame = tame && (ratio <= EVEN || h <= max(THIN_PANEL.x / absorbing, THIN_PANEL.y));
         if min(min(n.tau.x, n.tau.y), n.tau.z) > 1e-2 * SOLID {
             // Nothing is seen of it but its front.
             let front = nodes_at(vec3f(u), middle);
@@ -743,7 +745,12 @@ fn of_stretch() -> vec4f {
             if u >= 1.0 - SAME || through < DARK {
                 return sum;
             }
-            h = select(min(2.0 * h, longest), longest, is_all);
+            var growth = 2.0;
+            //#if LOGARITHMIC
+            // Towards where a logarithm is infinite, panels get shorter.
+            growth = select(2.0, 0.5, ratio > FACTOR && n.most.z > n.most.x);
+            //#end
+            h = select(min(growth * h, longest), longest, is_all);
             if is_all {
                 end = next_break(u, breaks);
             }

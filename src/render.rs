@@ -171,6 +171,7 @@ impl Renderer {
     /// Draws with other variants of the projection engine from now on; nothing to other engines.
     pub fn set_projection(&mut self, projection: ProjectionOptions) {
         self.projection = projection;
+        self.name_device();
     }
 
     /// Integrates segments in another form from now on. The next frame waits for its table, if one was named; with

@@ -41,8 +41,8 @@ pub(crate) struct Held {
 }
 
 impl Held {
-    /// Hands over what the device does not hold yet of a scene of so many cells. `even` stands where functions of one variable are
-    /// read.
+    /// Hands over what the device does not hold yet of a scene of so many cells, and says whether that was anything. `even` stands
+    /// where functions of one variable are read.
     ///
     /// # Errors
     /// Those of [`Chunks::new`].
@@ -52,8 +52,11 @@ impl Held {
         scene: &SecondScene<N>,
         cells: usize,
         even: &Exact<f32>,
-    ) -> Result<()> {
+    ) -> Result<bool> {
         let [of_values, of_function, of_seen] = scene.stamps;
+        let holds =
+            [self.values.as_ref().map(|v| v.0), self.function.as_ref().map(|f| f.0), self.seen.as_ref().map(|s| s.0)];
+        let is_new = holds != scene.stamps.map(Some);
         if self.values.as_ref().is_none_or(|v| v.0 != of_values) {
             self.values = None;
             let pairs = arrays::some_of(gpu, "values", scene.values, |v: &[f32; N]| [v[0], v[1]])?;
@@ -78,7 +81,7 @@ impl Held {
         if self.even.is_none() {
             self.even = Some(function::upload(gpu, even)?);
         }
-        Ok(())
+        Ok(is_new)
     }
 
     /// The pairs (s, g), the bits of the cells, and the gradients, if there are any.

@@ -14,7 +14,7 @@ impl Renderer {
         }
         let left = self.mesh.as_ref().is_some_and(|m| m.left_to_walk);
         let second = self.transfer.as_ref().filter(|t| !t.is_of_one_variable() && !left);
-        let lacking = second.and_then(|t| self.backend.lacks_second(t, &self.integral.two));
+        let lacking = second.and_then(|t| self.backend.lacks_second(t, &self.integral.two, &self.projection));
         let by_cpu = left || lacking.is_some();
         self.stats.engine = match by_cpu {
             true if !left && self.backend.projects_second(self.engine) => "project",

@@ -14,6 +14,7 @@ use crate::image::Image;
 use crate::integral::options::{Culling, Two};
 use crate::integral::second::{LONGEST, OfTwo, Pairs, Rows, Second, Wide, places};
 use crate::integral::{Exact, Integral};
+use crate::project::ProjectionOptions;
 use crate::project::cpu::{self as sweep, Sweep, UNSEEN};
 use crate::transfer::TransferFunction;
 use crate::transfer::bivariate::{Bivariate, Source};
@@ -89,8 +90,8 @@ enum Painter<'a> {
     Walk,
     /// The projection on the CPU.
     Sweep(&'a mut Sweep),
-    /// The device of a backend.
-    Device(&'a mut Backend),
+    /// The device of a backend, with the projection's options.
+    Device(&'a mut Backend, &'a ProjectionOptions),
 }
 
 /// The values of a frame.
@@ -114,14 +115,14 @@ impl Renderer {
         let transfer = self.transfer.as_ref().ok_or_else(|| missing("transfer function"))?;
         let (extra, two) = (&mut self.extra, self.integral.two);
         let by_device = self.backend.gpu().is_some() && !mesh.left_to_walk;
-        let by_device = by_device && self.backend.lacks_second(transfer, &two).is_none();
+        let by_device = by_device && self.backend.lacks_second(transfer, &two, &self.projection).is_none();
         let projects = !by_device && !mesh.left_to_walk && self.backend.projects_second(self.engine);
         let uploaded = self.backend.gpu().map_or(0, Gpu::uploaded);
         let painter = match (&mut self.backend, projects) {
-            (backend, _) if by_device => Painter::Device(backend),
+            (backend, _) if by_device => Painter::Device(backend, &self.projection),
             (_, false) => Painter::Walk,
-            (Backend::Project(sweep), _) => Painter::Sweep(&mut **sweep),
-            _ => Painter::Sweep(&mut **self.sweep.get_or_insert_with(|| Box::new(Sweep::new()))),
+            (Backend::Project(sweep), _) => Painter::Sweep(sweep),
+            _ => Painter::Sweep(self.sweep.get_or_insert_with(|| Box::new(Sweep::new()))),
         };
         let drawn = self.pool.install(|| {
             let longest = *mesh.longest.get_or_insert_with(|| mesh.geometry.longest_edge());
@@ -129,7 +130,7 @@ impl Renderer {
             let culled = made.seen.map_or((0, 0.0), |s| (s.culled, s.ms));
             Ok::<_, Error>((made.draw(mesh, longest, painter, view, progress)?, culled))
         });
-        let (DrawnFrame { pixels, counts, sweep, device_ms, .. }, (culled_cells, culling_ms)) = drawn?;
+        let (DrawnFrame { pixels, counts, sweep, device_ms, projection }, (culled_cells, culling_ms)) = drawn?;
         let (mut device_bytes, mut uploaded_bytes) = (mesh.geometry.bytes() + self.extra.bytes(), 0);
         if let Some(gpu) = self.backend.gpu().filter(|_| by_device) {
             (device_bytes, uploaded_bytes) = (gpu.allocated(), gpu.uploaded() - uploaded);
@@ -148,7 +149,7 @@ impl Renderer {
             device_bytes,
             uploaded_bytes,
             device_ms,
-            projection: None,
+            projection,
             sweep,
             frame_ms: ms(start),
             ..std::mem::take(&mut self.stats)
@@ -417,7 +418,7 @@ impl Made<'_> {
                 let integral = Integral { exact: even, table: None, second };
                 swept(sweep.render(&sweep::Frame { geometry, values, integral, view, color: &|_| [0.0; 4], progress }))
             }
-            Painter::Device(backend) => self.draw_on(backend, values, mesh, view, progress)?,
+            Painter::Device(backend, projection) => self.draw_on(backend, values, mesh, view, projection, progress)?,
         })
     }
 
@@ -428,6 +429,7 @@ impl Made<'_> {
         values: &Values<N>,
         mesh: &Loaded,
         view: &View,
+        projection: &ProjectionOptions,
         progress: &Progress,
     ) -> Result<DrawnFrame> {
         let (geometry, seen) = (&mesh.geometry, self.seen.map(|s| &s.bits[..]));
@@ -435,7 +437,7 @@ impl Made<'_> {
         let rows = rows.get_or_init(|| wide.rows(second));
         let stamps = [self.stamp, *stamp, self.seen.map_or(0, |s| s.stamp)];
         let scene = SecondScene { values, rows, seen, stamps };
-        let (mut drawn, left) = backend.draw_second(geometry, &scene, even, view)?;
+        let (mut drawn, left) = backend.draw_second(geometry, &scene, even, view, projection)?;
         let by_cpu = render_pixels_of_two(geometry, values, second, seen, view, &left);
         left.iter().zip(by_cpu).for_each(|(&i, p)| drawn.pixels[i] = p);
         drawn.counts.unfinished = left.len() as u64;

@@ -1,4 +1,5 @@
-//! A function of two variables, or with light, as `shaders/second.wgsl` reads it: what holds for all of it, and rows of numbers.
+//! A function of two variables, or with light, as `shaders/second.wgsl` reads it: what holds for all of it, and rows of
+//! numbers.
 
 use super::panel::SHARE;
 use super::{Form, Source, Wide};
