@@ -98,6 +98,17 @@ fn key_of(cell: u32) -> u32 {
     if !(is_visible(v[0]) && is_visible(v[1]) && is_visible(v[2]) && is_visible(v[3])) {
         return HIDDEN;
     }
+    //#if SECOND
+    if !may_be_seen(cell) {
+        return HIDDEN;
+    }
+    //#end
+    //#if LIT
+    hold_slopes(cell, corners);
+    if !has_slopes() {
+        return HIDDEN;
+    }
+    //#end
     let s = vec4f(last_of(v[0]), last_of(v[1]), last_of(v[2]), last_of(v[3]));
     if !SHOWS_ALL && !shows(least_of(s), greatest_of(s)) {
         return HIDDEN;
@@ -167,6 +178,9 @@ fn project_all(@builtin(global_invocation_id) id: vec3u) {
     let entry = order[part.first + i];
     let cell = entry & ((1u << PART) - 1u);
     let corners = cells(cell);
+    //#if LIT
+    hold_slopes(cell, corners);
+    //#end
     write_primitive(i, solid_of(corners), values_of(cell, corners), entry >> PART, part.rank + i);
 }
 

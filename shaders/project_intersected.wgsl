@@ -203,6 +203,11 @@ fn write_primitive(i: u32, solid: Solid, own_values: array<Value, 4>, piece: u32
     let at = array<DoubleSingle, 4>(own[to.x], own[to.y], own[to.z], own[to.w]);
     var given = own_values;
     let v = array<Value, 4>(given[to.x], given[to.y], given[to.z], given[to.w]);
+    //#if LIT
+    let q = array<vec3f, 4>(own_slopes[to.x], own_slopes[to.y], own_slopes[to.z], own_slopes[to.w]);
+    let leans = array<vec3f, 3>(q[1] - q[0], q[2] - q[0], q[3] - q[0]);
+    var lean: array<vec3f, 3>;
+    //#end
     let ab = added(at[1], negated(at[0]));
     let ac = added(at[2], negated(at[0]));
     let ad = added(at[3], negated(at[0]));
@@ -286,6 +291,9 @@ fn write_primitive(i: u32, solid: Solid, own_values: array<Value, 4>, piece: u32
             let edges = vec3f(dot(bc, turns_b[k]), -of_c, of_b);
             facets[k] = vec4f(thickness * (edges / slopes.xyz), reference[k]);
             rise[k] = (rises[1] * of_b - rises[0] * of_c) / slopes.w;
+            //#if LIT
+            lean[k] = (leans[1] * of_b - leans[0] * of_c) / slopes.w;
+            //#end
         }
         // The value where the pixel's ray meets the reference, and how values change from there. Fragments divide the change by
         // the depth, so what that would add to the first value is taken off.
@@ -295,6 +303,12 @@ fn write_primitive(i: u32, solid: Solid, own_values: array<Value, 4>, piece: u32
         to_right = rise[1] - taken * reference.y;
         to_below = rise[2] - taken * reference.z;
         towards_eye = -(rises[0] * slopes.y + rises[1] * slopes.z + rises[2] * slopes.w) / volume - taken;
+        //#if LIT
+        let first_lean = lean[0] / select(1.0, 1.0 + reference.x, PERSPECTIVE);
+        let off = select(vec3f(), first_lean, PERSPECTIVE);
+        let eye_lean = -(leans[0] * slopes.y + leans[1] * slopes.z + leans[2] * slopes.w) / volume - off;
+        hold_lit(q[0] + first_lean, lean[1] - off * reference.y, lean[2] - off * reference.z, eye_lean);
+        //#end
     } else {
         let share = array<Value, 3>(rises[0] / volume, rises[1] / volume, rises[2] / volume);
         middle += share[0] * heights.y + share[1] * heights.z + share[2] * heights.w;
@@ -302,6 +316,15 @@ fn write_primitive(i: u32, solid: Solid, own_values: array<Value, 4>, piece: u32
         to_below = share[0] * along_rows.y + share[1] * along_rows.z + share[2] * along_rows.w;
         towards_eye = -(share[0] * dot(out, n[1]) + share[1] * dot(out, n[2]) + share[2] * dot(out, n[3]));
         facets = array<vec4f, 3>(heights / slopes, across / slopes, along_rows / slopes);
+        //#if LIT
+        let parts = array<vec3f, 3>(leans[0] / volume, leans[1] / volume, leans[2] / volume);
+        hold_lit(
+            q[0] + parts[0] * heights.y + parts[1] * heights.z + parts[2] * heights.w,
+            parts[0] * across.y + parts[1] * across.z + parts[2] * across.w,
+            parts[0] * along_rows.y + parts[1] * along_rows.z + parts[2] * along_rows.w,
+            -(parts[0] * dot(out, n[1]) + parts[1] * dot(out, n[2]) + parts[2] * dot(out, n[3])),
+        );
+        //#end
     }
     heights += PERTURBATION.x * across + PERTURBATION.y * along_rows;
     var attributes: array<vec4f, 6>;

@@ -66,5 +66,9 @@ fn fragment(drawn: VertexOutput) -> Fragment {
     let here = fma(values[1], Value(offset.x), values[2] * offset.y);
     let front = clamp(fma(fma(values[3], Value(near.x), here), Value(share.x), values[0]), values[4], values[5]);
     let back = select(front, clamp(fma(fma(values[3], Value(near.y), here), Value(share.y), values[0]), values[4], values[5]), is_met);
+    //#if LIT
+    let t = select(rare.z - (met.reference + near.x), rare.z * share.x - frame.forward.w, PERSPECTIVE);
+    lit_from(slopes_in(attributes), near, share, offset, sample_of(at), t);
+    //#end
     return fragment_of(front, back, length, attributes, at, u32(rare.w));
 }

@@ -49,7 +49,8 @@ struct Counts {
     carry: atomic<u32>,
     /// Rays that were traced again beside their place.
     retraced: atomic<u32>,
-    unused: u32,
+    /// Panels that segments of two variables, or with light, were summed up in.
+    panels: atomic<u32>,
 }
 
 @group(0) @binding(3) var<uniform> frame: RayUniforms;
@@ -99,6 +100,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     steps = 0u;
     work = 0u;
     trace(straight, limits);
+    //#if SECOND
+    finished = finished && !is_coarse;
+    atomicAdd(&counts.panels, panels);
+    //#end
     if !finished {
         pixels[id.y * frame.size.x + id.x] = vec4f(0.0, 0.0, 0.0, UNFINISHED);
     } else if MAXIMUM {
@@ -301,6 +306,9 @@ fn walk(ray: Ray, entry: Entry, limits: vec2f) -> bool {
     if ASSOCIATION == POINT {
         corners = Corners(values(ids.x), values(ids.y), values(ids.z));
         front = interpolated(corners, weights);
+        //#if LIT
+        enter_lit(ids, weights);
+        //#end
     }
     for (var left = frame.most_steps; left > 0u; left--) {
         steps++;
@@ -327,6 +335,9 @@ fn walk(ray: Ray, entry: Entry, limits: vec2f) -> bool {
         } else {
             front = values(cell);
         }
+        //#if LIT
+        meet_lit(cell, c.corners, ids, apex, weights);
+        //#end
         // The apex is this far above the face that the ray entered through, measured along the ray.
         let rise = volumes(cell) / max(face.areas.x + face.areas.y + face.areas.z, TINY);
 
@@ -341,6 +352,9 @@ fn walk(ray: Ray, entry: Entry, limits: vec2f) -> bool {
             corners.c = select(corners.c, apex_value, drops.z);
             back = interpolated(corners, weights);
         }
+        //#if LIT
+        leave_lit(drops, weights);
+        //#end
 
         // The length comes from the volume, which is right in the thinnest cell. But in one that is seen edge-on the
         // areas are not, and the depths of the corners are.
@@ -354,7 +368,16 @@ fn walk(ray: Ray, entry: Entry, limits: vec2f) -> bool {
         } else {
             let end = min(length, (limits.y - (entered.x + entered.y)) * ray.length);
             if behind < end {
+                //#if LIT
+                light_from(ray, (entered.x + entered.y) * ray.length + behind, vec2f(behind, end) / length);
+                //#end
+                //#if SECOND
+                if may_be_seen(cell) {
+                //#end
                 gather(front, back, vec2f(behind, end) / length, end - behind);
+                //#if SECOND
+                }
+                //#end
             }
             behind = 0.0;
             if end < length || is_terminated() {
@@ -363,6 +386,9 @@ fn walk(ray: Ray, entry: Entry, limits: vec2f) -> bool {
         }
         entered = left_at;
         front = back;
+        //#if LIT
+        slope_front = slope_back;
+        //#end
         let beyond = vec4u(left_behind) == c.corners;
         cell = select(select(select(c.neighbours.w, c.neighbours.z, beyond.z), c.neighbours.y, beyond.y), c.neighbours.x, beyond.x);
         if cell == NONE {

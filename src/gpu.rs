@@ -19,6 +19,7 @@ pub(crate) mod lines;
 pub(crate) mod raster;
 pub(crate) mod rays;
 pub(crate) mod scene;
+pub(crate) mod second;
 pub(crate) mod shader;
 pub(crate) mod sort;
 pub(crate) mod stretch;

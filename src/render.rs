@@ -76,7 +76,7 @@ pub struct Renderer {
     /// The projection on the CPU that draws that in the place of a device's.
     sweep: Option<Box<Sweep>>,
     /// The engine that was said to draw neither.
-    lacking: Option<&'static str>,
+    lacking: Option<String>,
     integral: IntegrationOptions,
     tables: Tables,
     /// What of a table is needed, once that is known: none for the exact integral.
@@ -176,6 +176,7 @@ impl Renderer {
     /// Draws with other variants of the projection engine from now on; nothing to other engines.
     pub fn set_projection(&mut self, projection: ProjectionOptions) {
         self.projection = projection;
+        self.name_device();
     }
 
     /// Integrates segments in another form from now on. The next frame waits for its table, if one was named; with
@@ -188,6 +189,7 @@ impl Renderer {
             self.extra.invalidate_function();
             self.grid.iter_mut().for_each(LoadedGrid::invalidate_function);
             (self.key, self.waits, self.host_builds) = (None, integral.form != Form::Auto, false);
+            self.name_device();
         }
     }
 

@@ -5,6 +5,7 @@ use super::shader::ShaderArray;
 use super::{Gpu, rays};
 use crate::error::Result;
 use crate::geometry::{TetMesh, Values};
+use bytemuck::{NoUninit, Zeroable};
 
 /// An element of [`points`]: each coordinate is the sum of two.
 pub(crate) const POINT: &str = "\
@@ -32,12 +33,27 @@ pub(crate) fn points(gpu: &Gpu, geometry: &TetMesh) -> Result<Chunks> {
 /// # Errors
 /// Those of [`Chunks::new`].
 pub(crate) fn values<const N: usize>(gpu: &Gpu, values: &Values<N>) -> Result<Chunks> {
+    some_of(gpu, "values", values, |v: &[f32; N]| *v)
+}
+
+/// Some numbers of each of the values, as `some` picks them.
+///
+/// # Errors
+/// Those of [`Chunks::new`].
+pub(crate) fn some_of<const N: usize, const M: usize>(
+    gpu: &Gpu,
+    label: &str,
+    values: &Values<N>,
+    some: impl Fn(&[f32; N]) -> [f32; M],
+) -> Result<Chunks>
+where
+    [f32; M]: NoUninit + Zeroable,
+{
     let all = match values {
         Values::Point(v) | Values::Cell(v) => v.as_slice(),
         Values::Corner(v) => v.as_flattened(),
     };
-    let finite = |v: &[f32; N]| v.map(|v| if v.is_finite() { v } else { INVISIBLE });
-    Chunks::new(gpu, "values", all, finite)
+    Chunks::new(gpu, label, all, |v| some(v).map(|v| if v.is_finite() { v } else { INVISIBLE }))
 }
 
 /// `chunks` as shaders see them, by the names of the arrays and of their elements.
@@ -45,10 +61,12 @@ pub(crate) fn named<const N: usize>(
     names: [(&'static str, &'static str); N],
     chunks: [&Chunks; N],
 ) -> [ShaderArray; N] {
-    std::array::from_fn(|i| {
-        let (name, element) = names[i];
-        ShaderArray { name, element, chunks: chunks[i].buffers.len(), shift: chunks[i].shift }
-    })
+    std::array::from_fn(|i| of_name(names[i], chunks[i]))
+}
+
+/// One of them.
+pub(crate) fn of_name((name, element): (&'static str, &'static str), chunks: &Chunks) -> ShaderArray {
+    ShaderArray { name, element, chunks: chunks.buffers.len(), shift: chunks.shift }
 }
 
 /// What the shaders call their way of looking values up.

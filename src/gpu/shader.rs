@@ -62,6 +62,23 @@ pub(crate) fn prelude(variant: &ShaderVariant) -> String {
     text
 }
 
+/// `text` without the lines between `//#if NAME` and its `//#end` of names that are not `defined`, nor these lines themselves.
+pub(crate) fn with(text: &str, defined: &[&str]) -> String {
+    let (mut kept, mut open) = (String::with_capacity(text.len()), vec![]);
+    for line in text.lines() {
+        let word = line.trim_start();
+        if let Some(name) = word.strip_prefix("//#if ") {
+            open.push(defined.contains(&name.trim_end()));
+        } else if word.starts_with("//#end") {
+            open.pop();
+        } else if open.iter().all(|&is| is) {
+            kept += line;
+            kept.push('\n');
+        }
+    }
+    kept
+}
+
 /// Bindings of `arrays` in group 1, and the functions that look elements up in them.
 pub(crate) fn accessors(arrays: &[ShaderArray]) -> String {
     let (mut text, mut binding) = (String::new(), 0);

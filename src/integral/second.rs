@@ -40,7 +40,9 @@ use glam::DVec3;
 use panel::Rules;
 use segmented::Ends;
 use special::Erf;
-pub(crate) use wide::{Cell, Room, Row, Wide, window};
+#[cfg(test)]
+pub(crate) use wide::Head;
+pub(crate) use wide::{Cell, Forms, Kind, Room, Row, Rows, Wide, lacks, window};
 
 /// Extinction, times the unit distance, of what is opaque.
 const SOLID: f64 = 1e8;

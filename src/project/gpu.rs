@@ -11,6 +11,7 @@ mod lines;
 mod ordering;
 mod primitive;
 mod program;
+mod second;
 
 use super::{Fragments, Order, ProjectionCounts, ProjectionOptions, Target};
 use crate::error::{Error, Result};
@@ -19,18 +20,20 @@ use crate::geometry::{TetMesh, Values};
 use crate::gpu::buffers::{Buffer, Chunks};
 use crate::gpu::raster::{self, Slot, Texture};
 use crate::gpu::scene::DeviceScene;
+use crate::gpu::second::Held;
 use crate::gpu::shader::{ShaderArray, ShaderVariant};
 use crate::gpu::sort::Sorter;
 use crate::gpu::{DeviceChoice, Gpu, Part, arrays, function, table};
 use crate::integral::{Exact, PreintegratedTable};
 use crate::order::mpvo::Mpvo;
-use crate::view::Blend;
+use crate::view::{Blend, View};
 use bytemuck::{Pod, Zeroable};
 use drawing::Canvas;
 use frame::SeenView;
 use ordering::{Ordered, Sequenced, Sequencing};
 use primitive::Layout;
 use program::{DrawSettings, Program, program};
+pub(crate) use second::left;
 use std::sync::Arc;
 use std::time::Instant;
 use wgpu::{BufferUsages as Usage, ShaderStages as Stages};
@@ -80,6 +83,9 @@ pub(crate) struct Project {
     ordered: Option<Ordered>,
     table: table::TableCache,
     sorter: Option<Sorter>,
+    /// What functions of two variables, and light, need; and what stands for the lines and bins of one variable then.
+    second: Held,
+    even: Option<(Texture, Buffer)>,
     /// Whether the device sorts where it can; tests have the host do it.
     sorts: bool,
     /// Entries of one buffer of an order that the host finds, a multiple of [`BATCH`].
@@ -136,6 +142,8 @@ impl Project {
             ordered: None,
             table: table::TableCache::default(),
             sorter: None,
+            second: Held::default(),
+            even: None,
             sorts: true,
             order_chunk: BATCH << 6,
         })
@@ -170,7 +178,10 @@ impl Project {
             (self.mpvo, self.sequence) = (Mpvo::default(), None);
         }
         match part {
-            Part::Mesh => (self.cells, self.points, self.values) = (None, None, None),
+            Part::Mesh => {
+                (self.cells, self.points, self.values) = (None, None, None);
+                self.second = Held::default();
+            }
             Part::Points => self.points = None,
             Part::Field => self.values = None,
             Part::Function => self.function = None,
@@ -179,15 +190,21 @@ impl Project {
 
     /// Hands over what the device does not hold yet.
     fn upload<const N: usize>(&mut self, geometry: &TetMesh, values: &Values<N>) -> Result<()> {
+        self.upload_mesh(geometry)?;
+        if self.values.is_none() {
+            self.values = Some(arrays::values(&self.gpu, values)?);
+        }
+        Ok(())
+    }
+
+    /// Hands over what the device does not hold yet of the mesh alone.
+    fn upload_mesh(&mut self, geometry: &TetMesh) -> Result<()> {
         let gpu = &self.gpu;
         if self.cells.is_none() {
             self.cells = Some(Chunks::new(gpu, "cells", &geometry.cells, |c| c.corners)?);
         }
         if self.points.is_none() {
             self.points = Some(arrays::points(gpu, geometry)?);
-        }
-        if self.values.is_none() {
-            self.values = Some(arrays::values(gpu, values)?);
         }
         Ok(())
     }
@@ -224,6 +241,7 @@ impl Project {
         // Nothing is blended, and no segment integrated.
         let format = if is_maximum { wgpu::TextureFormat::Rgba32Float } else { self.format(options.target)? };
         let table = table.filter(|_| !is_maximum);
+        self.second = Held::default();
         self.upload(geometry, values)?;
         self.prepare_table(exact, table)?;
         let association = arrays::association(values);
@@ -240,8 +258,22 @@ impl Project {
         let drawn = DrawSettings { options, blend: view.blend() };
         let source = program(&variant, association, drawn, &layout, table.map(|t| &**t), limits, &arrays);
         self.prepare_canvas(&layout, view.size(), format, is_maximum)?;
-        self.compile(&arrays, source, drawn, layout, format)?;
-        let frame = Pass::new(self, &seen)?;
+        self.compile(&arrays, source, drawn, layout, format, None)?;
+        let FunctionBuffers { buffers, lines, bins } = self.function.as_ref().ok_or_else(unprepared)?;
+        let frame = Pass::new(self, &seen, buffers, (lines, bins), &self.chunks()?, None)?;
+        self.finish(geometry, view, &seen, frame, options)
+    }
+
+    /// Orders and draws the cells, with the program that was compiled last.
+    fn finish(
+        &mut self,
+        geometry: &TetMesh,
+        view: &View,
+        seen: &SeenView,
+        frame: Pass,
+        options: &ProjectionOptions,
+    ) -> Result<(Vec<[f32; 4]>, ProjectionCounts)> {
+        let is_maximum = view.blend() == Blend::Maximum;
         // Without neighbours there is depth.
         let by = match options.order {
             // The largest value needs none.
@@ -252,13 +284,13 @@ impl Project {
         let mut counts = ProjectionCounts { order: by, ..ProjectionCounts::default() };
         let splits = options.fragments != Fragments::Intersected && view.eye().is_some();
         let asked = Sequencing { by, splits, all: is_maximum };
-        if !self.ordered.as_ref().is_some_and(|o| o.holds_for(&seen, asked)) {
+        if !self.ordered.as_ref().is_some_and(|o| o.holds_for(seen, asked)) {
             let start = Instant::now();
             self.ordered = None;
             if let Some(rule) = by.rule() {
-                self.find_sequence(geometry, view, &seen, rule);
+                self.find_sequence(geometry, view, seen, rule);
             }
-            self.ordered = Some(self.order(&frame, &seen, geometry, asked)?);
+            self.ordered = Some(self.order(&frame, seen, geometry, asked)?);
             counts.sorts = 1;
             counts.order_ms = start.elapsed().as_secs_f64() * 1e3;
         }
@@ -320,16 +352,23 @@ impl Project {
 struct Pass {
     shared: wgpu::BindGroup,
     arrays: wgpu::BindGroup,
+    /// The function of two variables, for fragments.
+    second: Option<wgpu::BindGroup>,
     bins: wgpu::Buffer,
     _buffers: [Buffer; 3],
 }
 
 impl Pass {
-    fn new(project: &Project, seen: &SeenView) -> Result<Self> {
+    fn new(
+        project: &Project,
+        seen: &SeenView,
+        function: &[Buffer; 3],
+        (lines, bins): (&Texture, &Buffer),
+        chunks: &[&Chunks],
+        second: Option<wgpu::BindGroup>,
+    ) -> Result<Self> {
         let gpu = &project.gpu;
-        let (Some(FunctionBuffers { buffers: function, lines, bins, .. }), Some(program), Some(table)) =
-            (&project.function, project.programs.first(), project.table.get())
-        else {
+        let (Some(program), Some(table)) = (project.programs.first(), project.table.get()) else {
             return Err(unprepared());
         };
         let buffers = [
@@ -339,10 +378,11 @@ impl Pass {
         ];
         let shared = function.iter().chain(&buffers).map(|b| b.raw.as_entire_binding()).chain(table.bindings());
         let shared = shared.chain([wgpu::BindingResource::TextureView(&lines.view)]);
-        let arrays = project.chunks()?.into_iter().flat_map(|c| &c.buffers);
+        let arrays = chunks.iter().flat_map(|c| &c.buffers);
         Ok(Pass {
             shared: raster::group(gpu, &project.shared, shared),
             arrays: raster::group_of(gpu, &program.arrays, arrays),
+            second,
             bins: bins.raw.clone(),
             _buffers: buffers,
         })

@@ -6,14 +6,17 @@ use super::stats::{ProjectionStats, SweepStats};
 use crate::error::{Error, Result};
 use crate::geometry::{TetMesh, Values};
 use crate::gpu::scene::DeviceScene;
+use crate::gpu::second::SecondScene;
 use crate::gpu::{DeviceChoice, Gpu, Part};
-use crate::integral::{Exact, Integral, PreintegratedTable};
+use crate::integral::options::Two;
+use crate::integral::{Exact, Integral, PreintegratedTable, second};
 use crate::project::cpu::{self as sweep, Sweep};
 use crate::project::{self, ProjectionOptions, gpu::Project};
 use crate::render::Engine;
+use crate::transfer::TransferFunction;
 use crate::traverse::cpu;
-use crate::traverse::gpu::Traverse;
-use crate::view::Blend;
+use crate::traverse::gpu::{Traverse, WalkedFrame};
+use crate::view::{Blend, View};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -135,12 +138,21 @@ impl Backend {
         matches!(self, Backend::WalkOnDevice(_))
     }
 
-    /// What cannot draw a second variable or light; none if it can.
-    pub(super) fn lacks_second(&self) -> Option<&'static str> {
+    /// What of a second variable, light or silhouettes it cannot draw of `transfer`, integrated as `two` says; none if all.
+    pub(super) fn lacks_second(
+        &self,
+        transfer: &TransferFunction,
+        two: &Two,
+        projection: &ProjectionOptions,
+    ) -> Option<String> {
         match self {
             Backend::Walk | Backend::Project(_) => None,
-            Backend::WalkOnDevice(_) => Some("the walk on a device"),
-            Backend::ProjectOnDevice(_) => Some("the projection on a device"),
+            Backend::WalkOnDevice(_) => {
+                second::lacks(transfer, two).map(|what| format!("the walk on a device lacks {what}"))
+            }
+            Backend::ProjectOnDevice(_) => second::lacks(transfer, two)
+                .or_else(|| Project::lacks(transfer, projection))
+                .map(|what| format!("the projection on a device lacks {what}")),
         }
     }
 
@@ -205,6 +217,39 @@ impl Backend {
             Backend::WalkOnDevice(traverse) => walk_on(traverse, frame, values),
             Backend::Project(sweep) => project_by(sweep, frame, values),
             Backend::ProjectOnDevice(project) => project_on(project, frame, values),
+        }
+    }
+
+    /// Draws a frame of two variables, or with light, on the device, of which nothing is [lacking](Self::lacks_second); and says
+    /// which pixels are left to the CPU.
+    pub(super) fn draw_second<const N: usize>(
+        &mut self,
+        geometry: &TetMesh,
+        scene: &SecondScene<N>,
+        even: &Exact<f32>,
+        view: &View,
+        projection: &ProjectionOptions,
+    ) -> Result<(DrawnFrame, Vec<usize>)> {
+        match self {
+            Backend::Walk | Backend::Project(_) => {
+                Err(Error::Device("there is no device that draws two variables".into()))
+            }
+            Backend::ProjectOnDevice(project) => {
+                let (pixels, counts) = project.render_second(geometry, scene, even, view, projection)?;
+                let mut left = project::gpu::left(&pixels);
+                if projection.walks() {
+                    left.extend(project.disordered().iter().map(|&p| p as usize));
+                    left.sort_unstable();
+                    left.dedup();
+                }
+                let (device_ms, stats) = projected(&counts, left.len());
+                Ok((DrawnFrame { pixels, device_ms, projection: Some(stats), ..DrawnFrame::default() }, left))
+            }
+            Backend::WalkOnDevice(traverse) => {
+                let WalkedFrame { pixels, counts, device_ms } = traverse.render_second(geometry, scene, even, view)?;
+                let left = Traverse::unfinished(&pixels);
+                Ok((DrawnFrame { pixels, counts, device_ms, ..DrawnFrame::default() }, left))
+            }
         }
     }
 }
@@ -289,7 +334,13 @@ fn project_on<const N: usize>(project: &mut Project, frame: &Frame, values: &Val
         walked.iter().zip(by_cpu).for_each(|(&i, p)| pixels[i] = p);
     }
     let _ = (frame.progress)(1.0);
-    let project::ProjectionCounts { project_ms, draw_ms, .. } = counts;
+    let (device_ms, stats) = projected(&counts, walked.len());
+    Ok(DrawnFrame { pixels, device_ms, projection: Some(stats), ..DrawnFrame::default() })
+}
+
+/// What a projection on a device that left so many pixels to the walk took, by its own clock, in ms; and what is said of it.
+fn projected(counts: &project::ProjectionCounts, walked: usize) -> (Option<f64>, ProjectionStats) {
+    let project::ProjectionCounts { project_ms, draw_ms, .. } = *counts;
     let stats = ProjectionStats {
         drawn_cells: counts.cells,
         order: counts.order,
@@ -298,12 +349,11 @@ fn project_on<const N: usize>(project: &mut Project, frame: &Frame, values: &Val
         cycles: counts.cycles,
         cycle_cells: counts.cycle_cells,
         cuts: counts.cuts,
-        walked_pixels: walked.len() as u64,
+        walked_pixels: walked as u64,
         overlapping_pixels: counts.overlapping,
         project_ms,
         draw_ms,
         fragments: counts.fragments,
     };
-    let device_ms = project_ms.zip(draw_ms).map(|(p, d)| p + d);
-    Ok(DrawnFrame { pixels, device_ms, projection: Some(stats), ..DrawnFrame::default() })
+    (project_ms.zip(draw_ms).map(|(p, d)| p + d), stats)
 }

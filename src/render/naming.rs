@@ -13,8 +13,9 @@ impl Renderer {
             return self.name_caster();
         }
         let left = self.mesh.as_ref().is_some_and(|m| m.left_to_walk);
-        let second = self.transfer.as_ref().is_some_and(|t| !t.is_of_one_variable());
-        let by_cpu = left || second;
+        let second = self.transfer.as_ref().filter(|t| !t.is_of_one_variable() && !left);
+        let lacking = second.and_then(|t| self.backend.lacks_second(t, &self.integral.two, &self.projection));
+        let by_cpu = left || lacking.is_some();
         self.stats.engine = match by_cpu {
             true if !left && self.backend.projects_second(self.engine) => "project",
             true => Backend::Walk.engine(),
@@ -28,9 +29,9 @@ impl Renderer {
         }
         // Nobody who left the choice to Halite on a CPU asked for another engine.
         let chosen = self.engine != Engine::Auto || self.backend.gpu().is_some();
-        let lacking = self.backend.lacks_second().filter(|_| second && !left && chosen);
-        if let (Some(engine), true) = (lacking, lacking != self.lacking) {
-            tracing::warn!("{engine} draws neither a second variable nor light yet; the CPU draws them");
+        let lacking = lacking.filter(|_| chosen);
+        if let Some(what) = lacking.as_ref().filter(|_| lacking != self.lacking) {
+            tracing::warn!("{what}; the CPU draws this");
         }
         self.lacking = lacking;
         (self.stats.device, self.stats.adapter) = match self.backend.gpu().filter(|_| !by_cpu) {

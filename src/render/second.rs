@@ -1,5 +1,5 @@
 //! Frames whose transfer function has a second variable, or light: what they need besides the field, kept as long as it
-//! holds. The CPU draws them: the projection, or the walk.
+//! holds. The engine of the renderer draws them; what a device lacks for them, the CPU does: the projection, or the walk.
 
 use super::backend::{Backend, swept};
 use super::{DrawnFrame, Loaded, Progress, Renderer, Stats, missing, ms};
@@ -8,17 +8,21 @@ use crate::field::gradient::length;
 use crate::field::normalization::MOST;
 use crate::field::{Association, Field, Gradient, Kind, Normalization};
 use crate::geometry::{TetMesh, Values};
+use crate::gpu::Gpu;
+use crate::gpu::second::SecondScene;
 use crate::image::Image;
 use crate::integral::options::{Culling, Two};
-use crate::integral::second::{LONGEST, OfTwo, Pairs, Second, Wide, places};
+use crate::integral::second::{LONGEST, OfTwo, Pairs, Rows, Second, Wide, places};
 use crate::integral::{Exact, Integral};
+use crate::project::ProjectionOptions;
 use crate::project::cpu::{self as sweep, Sweep, UNSEEN};
 use crate::transfer::TransferFunction;
 use crate::transfer::bivariate::{Bivariate, Source};
-use crate::traverse::cpu::render_two;
+use crate::traverse::cpu::{render_pixels_of_two, render_two};
 use crate::view::{Blend, View};
 use glam::DVec3;
 use rayon::prelude::*;
+use std::sync::OnceLock;
 use std::time::Instant;
 
 /// By how much less of the range of values must count for other maps to be better.
@@ -29,6 +33,8 @@ const BETTER: f64 = 4.0;
 pub(super) struct Extra {
     /// The gradient in world units, for the field and the points of now; the scale that it was made under.
     gradient: Option<Gradient>,
+    /// What was made so far: each has its number, by which devices know it.
+    made: u64,
     values: Option<Ready>,
     function: Option<Function>,
     seen: Option<Seen>,
@@ -39,8 +45,11 @@ pub(super) struct Extra {
 /// The function, ready for the values.
 #[derive(Debug)]
 pub(super) struct Function {
+    stamp: u64,
     second: Second,
     wide: Wide,
+    /// What devices read, once one asked for it.
+    rows: OnceLock<Rows>,
     /// What the sweep reads in the place of a function of one variable: one value.
     even: Exact<f32>,
 }
@@ -49,6 +58,8 @@ pub(super) struct Function {
 #[derive(Debug)]
 struct Made<'a> {
     values: &'a TwoOrFive,
+    /// The number of the values.
+    stamp: u64,
     function: &'a Function,
     seen: Option<&'a Seen>,
     lines: &'a [[u16; 2]],
@@ -57,6 +68,7 @@ struct Made<'a> {
 /// Which cells may be seen with the function of now.
 #[derive(Debug)]
 pub(super) struct Seen {
+    stamp: u64,
     culling: Culling,
     /// A bit for each.
     bits: Vec<u64>,
@@ -67,8 +79,19 @@ pub(super) struct Seen {
 /// Values, and how they are mapped: s and g.
 #[derive(Debug)]
 struct Ready {
+    stamp: u64,
     normal: [Normalization; 2],
     values: TwoOrFive,
+}
+
+/// What draws a frame.
+enum Painter<'a> {
+    /// The walk on the CPU.
+    Walk,
+    /// The projection on the CPU.
+    Sweep(&'a mut Sweep),
+    /// The device of a backend, with the projection's options.
+    Device(&'a mut Backend, &'a ProjectionOptions),
 }
 
 /// The values of a frame.
@@ -81,7 +104,7 @@ pub(super) enum TwoOrFive {
 }
 
 impl Renderer {
-    /// Draws a frame with a second variable, or light, on the CPU.
+    /// Draws a frame with a second variable, or light.
     pub(super) fn render_second(&mut self, view: &View, progress: &Progress) -> Result<Image> {
         let start = Instant::now();
         if self.mesh.as_ref().is_some_and(|m| !m.connected) {
@@ -91,19 +114,27 @@ impl Renderer {
         let field = self.field.as_ref().ok_or_else(|| missing("field"))?.field();
         let transfer = self.transfer.as_ref().ok_or_else(|| missing("transfer function"))?;
         let (extra, two) = (&mut self.extra, self.integral.two);
-        let projects = !mesh.left_to_walk && self.backend.projects_second(self.engine);
-        let sweep = match (&mut self.backend, projects) {
-            (_, false) => None,
-            (Backend::Project(sweep), _) => Some(&mut **sweep),
-            _ => Some(&mut **self.sweep.get_or_insert_with(|| Box::new(Sweep::new()))),
+        let by_device = self.backend.gpu().is_some() && !mesh.left_to_walk;
+        let by_device = by_device && self.backend.lacks_second(transfer, &two, &self.projection).is_none();
+        let projects = !by_device && !mesh.left_to_walk && self.backend.projects_second(self.engine);
+        let uploaded = self.backend.gpu().map_or(0, Gpu::uploaded);
+        let painter = match (&mut self.backend, projects) {
+            (backend, _) if by_device => Painter::Device(backend, &self.projection),
+            (_, false) => Painter::Walk,
+            (Backend::Project(sweep), _) => Painter::Sweep(sweep),
+            _ => Painter::Sweep(self.sweep.get_or_insert_with(|| Box::new(Sweep::new()))),
         };
         let drawn = self.pool.install(|| {
             let longest = *mesh.longest.get_or_insert_with(|| mesh.geometry.longest_edge());
             let made = extra.prepare(mesh, field, transfer, view.blend(), two, projects)?;
             let culled = made.seen.map_or((0, 0.0), |s| (s.culled, s.ms));
-            Ok::<_, Error>((made.draw(mesh, longest, sweep, view, progress), culled))
+            Ok::<_, Error>((made.draw(mesh, longest, painter, view, progress)?, culled))
         });
-        let (DrawnFrame { pixels, counts, sweep, .. }, (culled_cells, culling_ms)) = drawn?;
+        let (DrawnFrame { pixels, counts, sweep, device_ms, projection }, (culled_cells, culling_ms)) = drawn?;
+        let (mut device_bytes, mut uploaded_bytes) = (mesh.geometry.bytes() + self.extra.bytes(), 0);
+        if let Some(gpu) = self.backend.gpu().filter(|_| by_device) {
+            (device_bytes, uploaded_bytes) = (gpu.allocated(), gpu.uploaded() - uploaded);
+        }
         self.stats = Stats {
             integral: two.method.name().into(),
             table_ms: 0.0,
@@ -111,14 +142,14 @@ impl Renderer {
             knots_per_cell: 0.0,
             steps: counts.steps,
             retraced_rays: counts.retraced,
-            cpu_rays: 0,
+            cpu_rays: counts.unfinished,
             panels: counts.panels,
             culled_cells,
             culling_ms,
-            device_bytes: mesh.geometry.bytes() + self.extra.bytes(),
-            uploaded_bytes: 0,
-            device_ms: None,
-            projection: None,
+            device_bytes,
+            uploaded_bytes,
+            device_ms,
+            projection,
             sweep,
             frame_ms: ms(start),
             ..std::mem::take(&mut self.stats)
@@ -139,7 +170,7 @@ impl TwoOrFive {
 impl Extra {
     /// Points have moved, or the field is another.
     pub(super) fn invalidate_field(&mut self) {
-        *self = Self::default();
+        *self = Extra { made: self.made, ..Self::default() };
     }
 
     /// The transfer function is another.
@@ -204,21 +235,26 @@ impl Extra {
         if !self.values.as_ref().is_some_and(good) {
             self.invalidate_function();
             let values = self.gather(mesh, field, normal, lit);
-            self.values = Some(Ready { normal, values });
+            self.made += 1;
+            self.values = Some(Ready { stamp: self.made, normal, values });
         }
         let Some(ready) = &self.values else { return Err(Error::Render("there are no values to draw".into())) };
         let TetMesh { centre, scale, .. } = mesh.geometry;
         let function = match self.function.take() {
             Some(function) => function,
-            None => Function::new(transfer, ready.normal, centre, scale, two)?,
+            None => {
+                self.made += 1;
+                Function::new(transfer, ready.normal, centre, scale, two, self.made)?
+            }
         };
         let second = &self.function.insert(function).second;
         if two.culling == Culling::None {
             self.seen = None;
         } else if self.seen.as_ref().is_none_or(|s| s.culling != two.culling) {
+            self.made += 1;
             self.seen = Some(match &ready.values {
-                TwoOrFive::Two(v) => Seen::new(&mesh.geometry, v, second, two.culling),
-                TwoOrFive::Five(v) => Seen::new(&mesh.geometry, v, second, two.culling),
+                TwoOrFive::Two(v) => Seen::new(&mesh.geometry, v, second, two.culling, self.made),
+                TwoOrFive::Five(v) => Seen::new(&mesh.geometry, v, second, two.culling, self.made),
             });
         }
         let cells = mesh.geometry.cells.len();
@@ -229,7 +265,8 @@ impl Extra {
             }
         }
         let Some(function) = &self.function else { return Err(Error::Render("there is no function to draw".into())) };
-        Ok(Made { values: &ready.values, function, seen: self.seen.as_ref(), lines: &self.lines })
+        let (values, stamp) = (&ready.values, ready.stamp);
+        Ok(Made { values, stamp, function, seen: self.seen.as_ref(), lines: &self.lines })
     }
 
     /// The values in the order of the mesh.
@@ -270,7 +307,13 @@ impl Extra {
 
 impl Seen {
     /// Judges all cells, on the current rayon pool.
-    fn new<const N: usize>(geometry: &TetMesh, values: &Values<N>, second: &Second, culling: Culling) -> Self {
+    fn new<const N: usize>(
+        geometry: &TetMesh,
+        values: &Values<N>,
+        second: &Second,
+        culling: Culling,
+        stamp: u64,
+    ) -> Self {
         let start = Instant::now();
         let cells = geometry.cells.len();
         let own = |v: &[f32; N]| second.own([v[0], v[1]].map(f64::from));
@@ -288,7 +331,7 @@ impl Seen {
         };
         let bits: Vec<u64> = (0..cells.div_ceil(64)).into_par_iter().with_min_len(64).map(word).collect();
         let seen: u64 = bits.iter().map(|w| u64::from(w.count_ones())).sum();
-        Seen { culling, bits, culled: cells as u64 - seen, ms: ms(start) }
+        Seen { stamp, culling, bits, culled: cells as u64 - seen, ms: ms(start) }
     }
 
     /// Which of so many `cells` may be seen, as the sweep reads it.
@@ -305,12 +348,13 @@ impl Function {
         centre: DVec3,
         scale: f64,
         two: Two,
+        stamp: u64,
     ) -> Result<Self> {
         let second = Second::new(transfer, normal, centre, scale, two);
         let even =
             TransferFunction::new(vec![(0.0, [1.0; 3])], vec![(0.0, 1.0)], 1.0)?.with_emission(transfer.emission())?;
         let even = Exact::new(&even, Kind::Scalar, &[normal[0]; 4], scale);
-        Ok(Function { wide: second.wide(), second, even })
+        Ok(Function { stamp, wide: second.wide(), second, rows: OnceLock::new(), even })
     }
 }
 
@@ -338,18 +382,18 @@ pub(super) fn check(field: &Field, transfer: &TransferFunction, blend: Blend) ->
 }
 
 impl Made<'_> {
-    /// Draws a frame on the current rayon pool, by the projection if there is one, else by the walk.
+    /// Draws a frame on the current rayon pool.
     fn draw(
         &self,
         mesh: &Loaded,
         longest: f64,
-        sweep: Option<&mut Sweep>,
+        painter: Painter,
         view: &View,
         progress: &Progress,
-    ) -> DrawnFrame {
+    ) -> Result<DrawnFrame> {
         match self.values {
-            TwoOrFive::Two(v) => self.draw_values(v, mesh, longest, sweep, view, progress),
-            TwoOrFive::Five(v) => self.draw_values(v, mesh, longest, sweep, view, progress),
+            TwoOrFive::Two(v) => self.draw_values(v, mesh, longest, painter, view, progress),
+            TwoOrFive::Five(v) => self.draw_values(v, mesh, longest, painter, view, progress),
         }
     }
 
@@ -358,18 +402,46 @@ impl Made<'_> {
         values: &Values<N>,
         mesh: &Loaded,
         longest: f64,
-        sweep: Option<&mut Sweep>,
+        painter: Painter,
         view: &View,
         progress: &Progress,
-    ) -> DrawnFrame {
+    ) -> Result<DrawnFrame> {
         let (geometry, seen) = (&mesh.geometry, self.seen.map(|s| &s.bits[..]));
-        let Function { second, wide, even } = self.function;
-        let Some(sweep) = sweep else {
-            let (image, counts) = render_two(geometry, values, second, seen, view, progress);
-            return DrawnFrame { pixels: image.pixels, counts, ..DrawnFrame::default() };
-        };
-        let second = Some(OfTwo { second, wide, seen, lines: self.lines, longest });
-        let integral = Integral { exact: even, table: None, second };
-        swept(sweep.render(&sweep::Frame { geometry, values, integral, view, color: &|_| [0.0; 4], progress }))
+        let Function { second, wide, even, .. } = self.function;
+        Ok(match painter {
+            Painter::Walk => {
+                let (image, counts) = render_two(geometry, values, second, seen, view, progress);
+                DrawnFrame { pixels: image.pixels, counts, ..DrawnFrame::default() }
+            }
+            Painter::Sweep(sweep) => {
+                let second = Some(OfTwo { second, wide, seen, lines: self.lines, longest });
+                let integral = Integral { exact: even, table: None, second };
+                swept(sweep.render(&sweep::Frame { geometry, values, integral, view, color: &|_| [0.0; 4], progress }))
+            }
+            Painter::Device(backend, projection) => self.draw_on(backend, values, mesh, view, projection, progress)?,
+        })
+    }
+
+    /// Draws a frame on a device; pixels that f32, or the device, is not enough for are those of the walk on the CPU.
+    fn draw_on<const N: usize>(
+        &self,
+        backend: &mut Backend,
+        values: &Values<N>,
+        mesh: &Loaded,
+        view: &View,
+        projection: &ProjectionOptions,
+        progress: &Progress,
+    ) -> Result<DrawnFrame> {
+        let (geometry, seen) = (&mesh.geometry, self.seen.map(|s| &s.bits[..]));
+        let Function { stamp, second, wide, rows, even } = self.function;
+        let rows = rows.get_or_init(|| wide.rows(second));
+        let stamps = [self.stamp, *stamp, self.seen.map_or(0, |s| s.stamp)];
+        let scene = SecondScene { values, rows, seen, stamps };
+        let (mut drawn, left) = backend.draw_second(geometry, &scene, even, view, projection)?;
+        let by_cpu = render_pixels_of_two(geometry, values, second, seen, view, &left);
+        left.iter().zip(by_cpu).for_each(|(&i, p)| drawn.pixels[i] = p);
+        drawn.counts.unfinished = left.len() as u64;
+        let _ = progress(1.0);
+        Ok(drawn)
     }
 }

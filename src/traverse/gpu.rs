@@ -1,5 +1,7 @@
 //! The walk on a GPU: what `shaders/traverse.wgsl` needs, handed over once and kept until it changes.
 
+mod second;
+
 use super::cpu::{Counts, least_transmittance};
 use crate::error::{Error, Result};
 use crate::geometry::boundary::{BoundaryFace, LEAF};
@@ -10,6 +12,7 @@ use crate::gpu::function;
 use crate::gpu::raster::{Readback, Slot};
 use crate::gpu::rays::{self, FAR};
 use crate::gpu::scene::DeviceScene;
+use crate::gpu::second::Held;
 use crate::gpu::shader::{self, ShaderArray, ShaderVariant};
 use crate::gpu::table::{self, TABLE};
 use crate::gpu::{Gpu, Part, arrays, raster};
@@ -110,7 +113,7 @@ struct RawCounts {
     steps: u32,
     carry: u32,
     retraced: u32,
-    unused: u32,
+    panels: u32,
 }
 
 /// A frame as the device drew it.
@@ -135,6 +138,8 @@ pub(crate) struct Traverse {
     /// Tables have a group of their own, in programs that read them.
     tables: wgpu::BindGroupLayout,
     table: table::TableCache,
+    /// What functions of two variables, and light, need.
+    second: Held,
 }
 
 impl Traverse {
@@ -142,8 +147,19 @@ impl Traverse {
         use Slot::{Read, Uniform, Write};
         let own = [Uniform, Read, Read, Uniform, Read, Read, Write, Write];
         let [layout, tables] = [&own[..], &table::SLOTS[..]].map(|slots| raster::layout(&gpu, Stages::COMPUTE, slots));
-        let table = table::TableCache::default();
-        Traverse { gpu, layout, cells: None, points: None, values: None, function: None, program: None, tables, table }
+        let (table, second) = (table::TableCache::default(), Held::default());
+        Traverse {
+            gpu,
+            layout,
+            cells: None,
+            points: None,
+            values: None,
+            function: None,
+            program: None,
+            tables,
+            table,
+            second,
+        }
     }
 
     pub(crate) fn gpu(&self) -> &Gpu {
@@ -159,7 +175,10 @@ impl Traverse {
     /// Takes `part` for changed.
     pub(crate) fn invalidate(&mut self, part: Part) {
         match part {
-            Part::Mesh => (self.cells, self.points, self.values) = (None, None, None),
+            Part::Mesh => {
+                (self.cells, self.points, self.values) = (None, None, None);
+                self.second = Held::default();
+            }
             Part::Points => self.points = None,
             Part::Field => self.values = None,
             Part::Function => self.function = None,
@@ -176,6 +195,19 @@ impl Traverse {
         values: &Values<N>,
         exact: &Exact<f32>,
     ) -> Result<()> {
+        self.upload_mesh(geometry)?;
+        let gpu = &self.gpu;
+        if self.values.is_none() {
+            self.values = Some(arrays::values(gpu, values)?);
+        }
+        if self.function.is_none() {
+            self.function = Some(function::upload(gpu, exact)?);
+        }
+        Ok(())
+    }
+
+    /// Hands over what the device does not hold yet of the mesh alone.
+    fn upload_mesh(&mut self, geometry: &TetMesh) -> Result<()> {
         let gpu = &self.gpu;
         if self.cells.is_none() {
             let cells = Chunks::new(gpu, "cells", &geometry.cells, |c| *c)?;
@@ -188,12 +220,6 @@ impl Traverse {
             let volumes = Chunks::new(gpu, "volumes", &geometry.cells, volume)?;
             let boxes = Chunks::new(gpu, "boxes", geometry.boundary.boxes(), outward)?;
             self.points = Some([points, volumes, boxes]);
-        }
-        if self.values.is_none() {
-            self.values = Some(arrays::values(gpu, values)?);
-        }
-        if self.function.is_none() {
-            self.function = Some(function::upload(gpu, exact)?);
         }
         Ok(())
     }
@@ -216,24 +242,35 @@ impl Traverse {
     /// Those of [`Gpu::check`] and [`Buffer::new`].
     pub(crate) fn render<const N: usize>(&mut self, scene: &DeviceScene<'_, N>) -> Result<WalkedFrame> {
         let DeviceScene { geometry, values, exact, table, view } = *scene;
+        self.second = Held::default();
         self.upload(geometry, values, exact)?;
         self.prepare_table(exact, table)?;
         let association = arrays::association(values);
         let arrays = self.arrays()?;
         let variant = ShaderVariant { kind: exact.kind, direct: exact.direct };
         let source = program(&variant, association, view.blend(), table.map(|t| &**t), &arrays);
-        if self.program.as_ref().is_none_or(|p| p.0 != source) {
-            let bindings = arrays.iter().map(|a| a.chunks).sum();
-            let gpu = &self.gpu;
-            let layout = raster::layout(gpu, Stages::COMPUTE, &vec![Slot::Read; bindings]);
-            let tables = table.is_some().then_some(Some(&self.tables));
-            let layouts: Vec<_> = [Some(&self.layout), Some(&layout)].into_iter().chain(tables).collect();
-            let module = raster::module(gpu, "traverse", &source);
-            let pipeline = raster::compute(gpu, &module, "main", &raster::pipeline_layout(gpu, &layouts));
-            gpu.check()?;
-            self.program = Some((source, pipeline, layout));
+        let tables = table.is_some().then_some(self.tables.clone());
+        self.compile(source, &arrays, tables.as_ref())?;
+        let own = self.table.get().filter(|_| table.is_some());
+        let tables = own.map(|t| raster::group(&self.gpu, &self.tables, t.bindings()));
+        let function = self.function.as_ref().ok_or_else(unprepared)?;
+        self.draw(geometry, function, &self.chunks()?, tables.as_ref(), view)
+    }
+
+    /// Compiles a program that reads `arrays`, and a third group, unless it is the last one.
+    fn compile(&mut self, source: String, arrays: &[ShaderArray], third: Option<&wgpu::BindGroupLayout>) -> Result<()> {
+        if self.program.as_ref().is_some_and(|p| p.0 == source) {
+            return Ok(());
         }
-        self.draw(geometry, table.is_some(), view)
+        let bindings = arrays.iter().map(|a| a.chunks).sum();
+        let gpu = &self.gpu;
+        let layout = raster::layout(gpu, Stages::COMPUTE, &vec![Slot::Read; bindings]);
+        let layouts: Vec<_> = [&self.layout, &layout].into_iter().chain(third).map(Some).collect();
+        let module = raster::module(gpu, "traverse", &source);
+        let pipeline = raster::compute(gpu, &module, "main", &raster::pipeline_layout(gpu, &layouts));
+        gpu.check()?;
+        self.program = Some((source, pipeline, layout));
+        Ok(())
     }
 
     /// The pixels whose rays the device did not finish, as indices.
@@ -258,15 +295,21 @@ impl Traverse {
             (Some([cells, faces]), Some([points, volumes, boxes]), Some(values)) => {
                 Ok([cells, faces, points, volumes, boxes, values])
             }
-            _ => Err(Error::Render("the device does not hold the mesh".into())),
+            _ => Err(unprepared()),
         }
     }
 
-    fn draw(&self, geometry: &TetMesh, tabulated: bool, view: &View) -> Result<WalkedFrame> {
+    /// Draws with the program that was compiled last: `function` in its first group, `chunks` in the second, and the `third`.
+    fn draw(
+        &self,
+        geometry: &TetMesh,
+        function: &[Buffer; 3],
+        chunks: &[&Chunks],
+        third: Option<&wgpu::BindGroup>,
+        view: &View,
+    ) -> Result<WalkedFrame> {
         let gpu = &self.gpu;
-        let (Some(function), Some((_, pipeline, group_layout))) = (&self.function, &self.program) else {
-            return Err(Error::Render("the device does not hold the transfer function".into()));
-        };
+        let (_, pipeline, group_layout) = self.program.as_ref().ok_or_else(unprepared)?;
         let [w, h] = view.size();
         let fan = view.fan(geometry.centre, geometry.scale, NEAR_EYE);
         let planes = rays::planes(view, geometry, DVec3::ZERO);
@@ -298,9 +341,7 @@ impl Traverse {
         let [parameters, knots, buckets] = function;
         let own = [parameters, knots, buckets, &frame_buffer, &planes, &ends, &pixels, &counts];
         let own = raster::group_of(gpu, &self.layout, own);
-        let shared = raster::group_of(gpu, group_layout, self.chunks()?.into_iter().flat_map(|c| &c.buffers));
-        let tables = self.table.get().filter(|_| tabulated);
-        let tables = tables.map(|t| raster::group(gpu, &self.tables, t.bindings()));
+        let shared = raster::group_of(gpu, group_layout, chunks.iter().flat_map(|c| &c.buffers));
         let clock = Clock::of_one_pass(gpu)?;
 
         let mut drawn = WalkedFrame {
@@ -321,8 +362,8 @@ impl Traverse {
                 pass.set_pipeline(pipeline);
                 pass.set_bind_group(0, &own, &[]);
                 pass.set_bind_group(1, &shared, &[]);
-                if let Some(tables) = &tables {
-                    pass.set_bind_group(2, tables, &[]);
+                if let Some(third) = third {
+                    pass.set_bind_group(2, third, &[]);
                 }
                 pass.dispatch_workgroups(w.div_ceil(8), rows.div_ceil(8), 1);
             }
@@ -337,6 +378,7 @@ impl Traverse {
                 let c: RawCounts = bytemuck::pod_read_unaligned(&rest[..16]);
                 drawn.counts.steps += u64::from(c.carry) << 32 | u64::from(c.steps);
                 drawn.counts.retraced += u64::from(c.retraced);
+                drawn.counts.panels += u64::from(c.panels);
                 if clock.is_some() {
                     let [start, end]: [u64; 2] = bytemuck::pod_read_unaligned(&rest[16..32]);
                     let ms = end.saturating_sub(start) as f64 * f64::from(gpu.queue.get_timestamp_period()) / 1e6;
@@ -348,6 +390,10 @@ impl Traverse {
     }
 }
 
+fn unprepared() -> Error {
+    Error::Render("the device is not prepared for a frame".into())
+}
+
 /// The whole program.
 fn program(
     variant: &ShaderVariant,
@@ -356,6 +402,20 @@ fn program(
     table: Option<&PreintegratedTable>,
     arrays: &[ShaderArray],
 ) -> String {
+    let mut text = constants(variant, association, blend, arrays);
+    let walk = shader::with(TRAVERSE, &[]);
+    if table.is_none() {
+        text += ADD_EXACT;
+        return [&text, shader::CELL, shader::INTEGRAL, &walk].join("\n");
+    }
+    text += ADD_TABULATED;
+    text += &table::constants(table, false);
+    text += &table::declarations(2, 0);
+    [&text, shader::CELL, shader::INTEGRAL, TABLE, &walk].join("\n")
+}
+
+/// What precedes all programs: constants, and the mesh's arrays.
+fn constants(variant: &ShaderVariant, association: &str, blend: Blend, arrays: &[ShaderArray]) -> String {
     let mut text = shader::prelude(variant);
     for (name, value) in [
         ("FAR", f64::from(FAR)),
@@ -377,14 +437,7 @@ fn program(
     text += &format!("const ASSOCIATION = {association};\n\n");
     text += arrays::POINT;
     text += &shader::accessors(arrays);
-    if table.is_none() {
-        text += ADD_EXACT;
-        return [&text, shader::CELL, shader::INTEGRAL, TRAVERSE].join("\n");
-    }
-    text += ADD_TABULATED;
-    text += &table::constants(table, false);
-    text += &table::declarations(2, 0);
-    [&text, shader::CELL, shader::INTEGRAL, TABLE, TRAVERSE].join("\n")
+    text
 }
 
 /// Six times the volume of a tetrahedron.

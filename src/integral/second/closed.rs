@@ -155,6 +155,12 @@ impl Profile {
         &self.turns[..self.count]
     }
 
+    /// The phases between which it is above the floor, its integral without a floor to the first of them, and that over a period.
+    pub(super) fn told(&self) -> [f64; 4] {
+        let [from, to] = self.above;
+        [from, to, self.turn.part(from), self.whole]
+    }
+
     /// The height at a phase, in [0, 1].
     pub(super) fn height(&self, p: f64) -> f64 {
         let height = self.turn.height(p);

@@ -21,7 +21,7 @@ pub(super) fn is_even(shading: &Shading) -> bool {
 }
 
 /// Whether a highlight begins so sharply that panels end there.
-fn begins(shade: &Shade) -> bool {
+pub(super) fn begins(shade: &Shade) -> bool {
     shade.highlight == Highlight::Reflected && shade.specular > 0.0 && shade.power < SMOOTH
 }
 

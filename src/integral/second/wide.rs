@@ -12,6 +12,7 @@
 mod nodes;
 mod panel;
 mod room;
+mod rows;
 #[cfg(test)]
 mod tests;
 
@@ -32,6 +33,9 @@ use fearless_simd::{Simd, mask32x16};
 use panel::{Rule, SHARE};
 use room::window_mut;
 pub(crate) use room::{Room, Row, window};
+#[cfg(test)]
+pub(crate) use rows::Head;
+pub(crate) use rows::{Forms, Kind, Rows, lacks};
 
 /// Widgets that the segments of a cell may see.
 const MOST_ACTIVE: usize = 8;

@@ -125,6 +125,9 @@ impl Project {
                 });
                 pass.set_pipeline(&program.draw);
                 pass.set_bind_group(0, &frame.shared, &[]);
+                if let Some(second) = &frame.second {
+                    pass.set_bind_group(1, second, &[]);
+                }
                 for part in 0..program.layout.parts {
                     let from = u64::from(part) * program.layout.part_bytes();
                     pass.set_vertex_buffer(part, canvas.primitives.raw.slice(from..));

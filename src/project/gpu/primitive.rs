@@ -37,11 +37,26 @@ pub(crate) struct Layout {
     values: (usize, usize),
     /// Whether the last attribute before the line is one that few pictures need.
     rare: bool,
+    /// Whether segments are of two variables; and the attributes after the values that tell gradients.
+    second: bool,
+    slopes: usize,
 }
+
+/// Attributes that tell gradients.
+const SLOPES: usize = 3;
 
 impl Layout {
     /// With one attribute more that few pictures need if `rare`.
     pub(crate) fn new(form: Fragments, components: usize, has_line: bool, rare: bool) -> Self {
+        Self::with(form, components, has_line, rare, false, 0)
+    }
+
+    /// Of two variables, and with the gradient if `lit`.
+    pub(crate) fn of_two(form: Fragments, rare: bool, lit: bool) -> Self {
+        Self::with(form, 2, false, rare, true, if lit { SLOPES } else { 0 })
+    }
+
+    fn with(form: Fragments, components: usize, has_line: bool, rare: bool, second: bool, slopes: usize) -> Self {
         let is_intersected = form == Fragments::Intersected;
         let own = match is_intersected {
             true => vec![("corner", 2)],
@@ -54,7 +69,7 @@ impl Layout {
         let parts = triangles.iter().fold(0, |n, &i| n.max(i + 1));
         let line_at = attributes + usize::from(rare);
         let values = (line_at + usize::from(has_line), count);
-        let attributes = values.0 + (count * components).div_ceil(4);
+        let attributes = values.0 + (count * components).div_ceil(4) + slopes;
         let mut end = 0;
         let place = |(name, floats): (&'static str, usize)| {
             let bytes = 4 * floats as u64;
@@ -65,7 +80,26 @@ impl Layout {
         let own: Vec<_> = own.into_iter().map(place).collect();
         let share = attributes.div_ceil(parts as usize);
         let attributes_at = end.next_multiple_of(16);
-        Layout { triangles, parts, own, attributes, share, attributes_at, components, has_line, line_at, values, rare }
+        Layout {
+            triangles,
+            parts,
+            own,
+            attributes,
+            share,
+            attributes_at,
+            components,
+            has_line,
+            line_at,
+            values,
+            rare,
+            second,
+            slopes,
+        }
+    }
+
+    /// Whether segments are of two variables.
+    pub(crate) fn is_of_two(&self) -> bool {
+        self.second
     }
 
     /// Bytes of a part, and of a primitive.
@@ -124,6 +158,7 @@ impl Layout {
             None if i >= line_at => "vec4f(f32(line_at(low, high)), 0.0, 0.0, 0.0)".into(),
             None if i >= usual => "rare".into(),
             None => format!("attributes[{i}]"),
+            _ if i >= attributes - self.slopes => format!("slope_attributes[{}]", i + self.slopes - attributes),
             Some(k) => format!("vec4f({})", (4 * k..4 * k + 4).map(packed).collect::<Vec<_>>().join(", ")),
         };
         let value = |i: usize| {
@@ -133,6 +168,7 @@ impl Layout {
         };
         let values: Vec<_> = (0..count).map(value).collect();
         let integral = match has_line {
+            _ if self.second => "return of_segment(front, back, length);".into(),
             true => format!("return by_lookups(front, back, length, u32(attributes[{line_at}].x));"),
             false => "light = vec4f(0.0, 0.0, 0.0, 1.0);
                 add_segment(front, back, length);
@@ -175,7 +211,13 @@ impl Layout {
                 if self.rare { format!("attributes[{usual}]") } else { "vec4f()".into() }
             ),
             format!("fn values_in(attributes: Attributes) -> Values {{ return Values({}); }}", values.join(", ")),
-            String::new(),
+            match self.slopes {
+                0 => String::new(),
+                n => format!(
+                    "fn slopes_in(attributes: Attributes) -> array<vec4f, {n}> {{ return array<vec4f, {n}>({}); }}\n",
+                    (attributes - n..attributes).map(|i| format!("attributes[{i}]")).collect::<Vec<_>>().join(", ")
+                ),
+            },
         ]
         .join("\n")
     }

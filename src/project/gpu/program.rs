@@ -5,22 +5,27 @@ use super::frame::{GROWTH, Limits};
 use super::lines::{BINS, LINES_ACROSS};
 use super::primitive::Layout;
 use crate::error::Result;
+use crate::field::Kind;
 use crate::gpu::arrays;
 use crate::gpu::raster::{self, Slot};
 use crate::gpu::rays::FAR;
+use crate::gpu::second;
 use crate::gpu::shader::{self, ShaderArray, ShaderVariant};
 use crate::gpu::table::{self, TABLE};
 use crate::integral::PreintegratedTable;
+use crate::integral::second::Rows;
 use crate::order::depth::HIDDEN;
 use crate::order::{MOST_PARTS, PART};
 use crate::project::{Compositing, Fragments, ProjectionOptions, Thickness};
 use crate::view::Blend;
+use std::fmt::Write;
 use wgpu::ShaderStages as Stages;
 
 const SHARED: &str = include_str!("../../../shaders/project.wgsl");
 const CELLS: &str = include_str!("../../../shaders/project_cells.wgsl");
 const LINES: &str = include_str!("../../../shaders/project_lines.wgsl");
 const SHADE: &str = include_str!("../../../shaders/project_shade.wgsl");
+const SECOND: &str = include_str!("../../../shaders/project_second.wgsl");
 
 /// For each form: its primitives, and how they are drawn.
 const INTERSECTED: [&str; 2] = [
@@ -61,6 +66,12 @@ const KEPT: usize = 4;
 /// Pixels along a side of the blocks that rasterisers do at once.
 const BLOCK: f64 = 2.0;
 
+/// Opacity of fragments that f32 is too coarse for: 16-bit floats hold it.
+const COARSE: f32 = -3e4;
+
+/// Opacities below this are of pixels with such fragments.
+pub(super) const LEFT: f32 = -0.5;
+
 /// Loop iterations of a fragment that llvmpipe surely makes: see `traverse::gpu`.
 const MOST_WORK: u32 = 8000;
 
@@ -84,6 +95,7 @@ impl Project {
         drawn: DrawSettings,
         layout: Layout,
         format: wgpu::TextureFormat,
+        second: Option<&wgpu::BindGroupLayout>,
     ) -> Result<()> {
         let DrawSettings { options, blend } = drawn;
         let compositing = options.compositing;
@@ -97,7 +109,8 @@ impl Project {
         let array_layout = raster::layout(gpu, Stages::COMPUTE, &vec![Slot::Read; bindings]);
         let module = raster::module(gpu, "project", &source);
         let cells = raster::pipeline_layout(gpu, &[Some(&self.shared), Some(&array_layout), Some(&self.own)]);
-        let drawing = raster::pipeline_layout(gpu, &[Some(&self.shared)]);
+        let groups: Vec<_> = [&self.shared].into_iter().chain(second).map(Some).collect();
+        let drawing = raster::pipeline_layout(gpu, &groups);
         let blend = (blend == Blend::Composite).then_some(wgpu::BlendComponent {
             src_factor: wgpu::BlendFactor::One,
             dst_factor: match compositing {
@@ -143,6 +156,50 @@ pub(super) fn program(
     limits: Limits,
     arrays: &[ShaderArray],
 ) -> String {
+    let drawn = DrawSettings { options, blend };
+    let text = constants(variant, association, drawn, layout, table, limits, arrays);
+    let [primitives, drawing] = forms_of(options);
+    let [cells, primitives, drawing] = [CELLS, primitives, drawing].map(|of| shader::with(of, &[]));
+    [&text, shader::CELL, shader::INTEGRAL, TABLE, SHARED, LINES, &cells, &primitives, SHADE, &drawing].join("\n")
+}
+
+/// The whole program for functions of two variables, and light.
+pub(super) fn program_of_two(
+    rows: &Rows,
+    association: &str,
+    drawn: DrawSettings,
+    layout: &Layout,
+    limits: Limits,
+    arrays: &[ShaderArray],
+) -> String {
+    let variant = ShaderVariant { kind: Kind::Pair, direct: rows.forms.direct };
+    let mut text = String::from(second::VECTOR);
+    text += &constants(&variant, association, drawn, layout, None, limits, arrays);
+    let _ = writeln!(text, "const COARSE = {COARSE:?}f;");
+    let defined = second::defined(&rows.forms);
+    let [primitives, drawing] = forms_of(drawn.options);
+    let [cells, primitives, drawing, own] = [CELLS, primitives, drawing, SECOND].map(|of| shader::with(of, &defined));
+    // Fragments have no other second group.
+    let integral = second::program(rows).replace("@group(2)", "@group(1)");
+    [&text, shader::CELL, shader::INTEGRAL, &integral, TABLE, SHARED, LINES, &cells, &primitives, SHADE, &drawing, &own]
+        .join("\n")
+}
+
+/// How primitives of a form are made, and drawn.
+fn forms_of(options: &ProjectionOptions) -> [&'static str; 2] {
+    if options.fragments == Fragments::Intersected { INTERSECTED } else { INTERPOLATED }
+}
+
+/// What precedes all programs: constants, primitives and the mesh's arrays.
+fn constants(
+    variant: &ShaderVariant,
+    association: &str,
+    DrawSettings { options, blend }: DrawSettings,
+    layout: &Layout,
+    table: Option<&PreintegratedTable>,
+    limits: Limits,
+    arrays: &[ShaderArray],
+) -> String {
     let mut text = shader::prelude(variant);
     // Twice the area of the blocks that a line of unit length passes, by its mean direction.
     let doubled = 2.0 * BLOCK * 4.0 / std::f64::consts::PI;
@@ -164,7 +221,8 @@ pub(super) fn program(
         ("HAS_PLANES", limits.planes),
         ("IS_CLIPPED", limits.range),
         ("PERSPECTIVE", limits.perspective),
-        ("SHOWS_ALL", blend == Blend::Maximum),
+        // Of two variables, the bits of cells say what may be seen.
+        ("SHOWS_ALL", blend == Blend::Maximum || layout.is_of_two()),
     ] {
         text += &format!("const {name} = {value};\n");
     }
@@ -174,11 +232,10 @@ pub(super) fn program(
          const POINT = 0u;\nconst CORNER = 1u;\nconst CELL = 2u;\nconst ASSOCIATION = {association};\n"
     );
     text += arrays::POINT;
-    let [primitives, drawing] = if form == "INTERSECTED" { INTERSECTED } else { INTERPOLATED };
     text += &layout.wgsl();
     text += &shader::accessors(arrays);
     text += &table::constants(table, limits.plane_per_cell);
     text += &table::declarations(0, 6);
     text += if blend == Blend::Maximum { LARGEST } else { BLENDED };
-    [&text, shader::CELL, shader::INTEGRAL, TABLE, SHARED, LINES, CELLS, primitives, SHADE, drawing].join("\n")
+    text
 }

@@ -16,6 +16,8 @@ use crate::view::{Camera, ClippingPlane, Projection, View};
 use glam::{DVec3, dvec3};
 use wgpu::naga;
 
+mod second;
+
 fn arrays(chunks: usize) -> Vec<ShaderArray> {
     ARRAYS.map(|(name, element)| ShaderArray { name, element, chunks, shift: 22 }).to_vec()
 }

@@ -3,6 +3,7 @@
 mod frames;
 mod kernels;
 mod random;
+mod second;
 mod twins;
 
 use crate::image::Image;

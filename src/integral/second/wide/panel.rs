@@ -51,6 +51,11 @@ impl Rule {
             to_node: [three(&to[0]), three(&to[1]), three(&to[2])],
         }
     }
+
+    /// Nodes, weights, and of each polynomial the integral to each node.
+    pub(super) fn parts(&self) -> ([f32; 3], [f32; 3], [[f32; 3]; 3]) {
+        (self.nodes, self.weights, self.to_node)
+    }
 }
 
 /// What holds in all of a panel.

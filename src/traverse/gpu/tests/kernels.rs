@@ -50,7 +50,7 @@ fn layouts_match_their_rust_twins() {
     check!("Box", Bounds, low high);
     check!("Knot", Knot, value slope ends);
     check!("Function", Function, opacity color end scale);
-    check!("Counts", RawCounts, steps carry retraced unused);
+    check!("Counts", RawCounts, steps carry retraced panels);
     check!("RayUniforms", RayUniforms, origin direction size first_row rows near far planes has_ends leaves faces most_steps most_work);
     check("Point", 24, &[0, 8, 16]);
 }
