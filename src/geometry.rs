@@ -361,9 +361,9 @@ fn along_curve(items: &[u32], place: impl Fn(u32) -> DVec3 + Sync) -> Vec<u32> {
     let sorted = |b: usize| {
         let mut keys: Vec<u64> = buckets.items(b).map(|n| keys[n as usize]).collect();
         if keys.len() < LARGE {
-            keys.sort_unstable()
+            keys.sort_unstable();
         } else {
-            keys.par_sort_unstable()
+            keys.par_sort_unstable();
         };
         // Items so near to each other that the first bits are alike.
         let alike = keys.chunk_by_mut(|a, b| start(*a) == start(*b)).filter(|same| same.len() > 1);

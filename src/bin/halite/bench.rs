@@ -123,7 +123,7 @@ fn measure(options: &Options, job: &Job, renderer: &mut Renderer) -> Result<Run>
     } else {
         renderer.check_room(job.mesh.points().len(), &job.tetrahedra)?;
         progress::during("matching faces", |p| {
-            renderer.set_tetrahedra_with_progress(&job.mesh, job.tetrahedra.clone(), p)
+            renderer.set_tetrahedra_with_progress(&job.mesh, job.tetrahedra.clone(), p);
         });
     }
     renderer.set_field(&job.field)?;

@@ -36,10 +36,10 @@ impl Renderer {
     /// Names what draws grids, and says what the CPU draws in the place of a device.
     pub(in crate::render) fn name_caster(&mut self) {
         let lacking = self.caster_lacks().filter(|_| self.backend.gpu().is_some());
-        if let (Some(what), true) = (lacking, lacking != self.lacking) {
+        if let (Some(what), true) = (lacking, lacking != self.lacking.as_deref()) {
             tracing::warn!("the ray caster of grids draws no {what} on a device yet; the CPU does");
         }
-        self.lacking = lacking;
+        self.lacking = lacking.map(str::to_owned);
         self.stats.engine = "grid".into();
         (self.stats.device, self.stats.adapter) = match self.backend.gpu().filter(|_| lacking.is_none()) {
             Some(gpu) => ("gpu".into(), gpu.adapter.name.clone()),
