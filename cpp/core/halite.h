@@ -455,7 +455,7 @@ public:
   /// Draws `mesh`, which is not needed afterwards; the field must be set again. Lengths along rays are lengths in the
   /// world.
   void setMesh(const Mesh& mesh, const Matrix* matrix = nullptr);
-  /// Draws `grid` in place of a mesh, as setMesh does. The CPU casts its rays, whatever the device and the engine are.
+  /// Draws `grid` in place of a mesh, as setMesh does: its rays are cast, whatever the engine, on the device or the CPU.
   void setGrid(const Grid& grid, const Matrix* matrix = nullptr);
   /// Moves the points of the mesh, or only its matrix, and keeps all else. False if that cannot be, because the new
   /// matrix makes a mirror image of the old one, other points are not finite than were, or a grid is drawn: then set it again.

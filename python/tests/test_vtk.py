@@ -4,7 +4,6 @@ import gc
 import os
 import subprocess
 import sys
-import threading
 import tracemalloc
 import weakref
 
@@ -199,14 +198,6 @@ def test_errors_are_raised_and_survived(fog, monkeypatch):
     for _ in range(3):
         interactor.Render()
     assert len(shown) == 1 and '"other"' in str(shown[0])
-    # From another thread too.
-    shot.SetScale(1)
-    v.scalars = "third"
-    shot.Modified()
-    thread = threading.Thread(target=shot.Update)
-    thread.start()
-    thread.join()
-    assert len(shown) == 2 and '"third"' in str(shown[1])
     v.scalars = "s"
     assert (pixels(w) == good).all() and v.error is None
     # Ctrl-C while a frame is drawn.
