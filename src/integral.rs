@@ -17,6 +17,7 @@ mod batch;
 pub(crate) mod cubic;
 pub(crate) mod floats;
 mod knots;
+pub(crate) mod lines;
 pub mod lookup;
 pub mod options;
 pub(crate) mod second;

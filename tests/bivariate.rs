@@ -156,6 +156,8 @@ fn functions() -> Vec<(&'static str, TransferFunction)> {
         ("a wide highlight and a cone that ends at once", spot(of(mix()), 1.0, 0.0)),
         ("silhouette", silhouette(knots(), 2.0)),
         ("a silhouette of 3.5", silhouette(of(vec![gaussian()]), 3.5)),
+        ("full raised sine, opacity", logarithmic(of(vec![Widget { opacity: 1.0, ..sine(wave(0.3), Sine::Raised) }]))),
+        ("full gaussian, opacity", logarithmic(of(vec![Widget { opacity: 1.0, ..gaussian() }]))),
     ]
 }
 

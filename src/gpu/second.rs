@@ -11,6 +11,7 @@ use std::fmt::Write;
 use wgpu::BufferUsages as Usage;
 
 const SECOND: &str = include_str!("../../shaders/second.wgsl");
+const SOURCES: &str = include_str!("../../shaders/second_sources.wgsl");
 const LIGHT: &str = include_str!("../../shaders/second_light.wgsl");
 
 /// The bindings of group 2: `Second` and the rows.
@@ -137,6 +138,7 @@ pub(crate) fn program(rows: &Rows) -> String {
     let _ = writeln!(text, "const BENDS = vec2f({:?}, {:?});", panels.bends[0], panels.bends[1]);
     let _ = writeln!(text, "const CLOSED_FORMS = {};", defined.contains(&"CLOSED"));
     text += &shader::with(SECOND, &defined);
+    text += &shader::with(SOURCES, &defined);
     if forms.lit {
         text += LIGHT;
     }

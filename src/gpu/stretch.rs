@@ -1,12 +1,12 @@
 //! What stretches along which the value is a cubic emit and absorb, as shaders have it: `shaders/stretch.wgsl`, behind constants
 //! taken from Rust.
 
-use super::lines::{BUCKETS, OFF};
 use super::rays::FAR;
 use super::shader::{self, ShaderVariant};
 use crate::field::Kind;
 use crate::integral::MOST_OF_PART;
 use crate::integral::cubic::stretch;
+use crate::integral::lines::{BUCKETS, OFF};
 use std::fmt::Write;
 
 pub(crate) const STRETCH: &str = include_str!("../../shaders/stretch.wgsl");

@@ -11,10 +11,12 @@ use std::collections::HashMap;
 /// The extinction, per unit distance, of what is opaque.
 const OPAQUE: f64 = 1e8;
 
-/// Where something is on a ray: its components, its place relative to the mesh's middle, and the ray's direction.
+/// Where something is on a ray: its components, by how much the first two rise over its interval, its place relative to the
+/// mesh's middle, and the ray's direction.
 struct Sample {
     s: f64,
     g: f64,
+    rise: [f64; 2],
     vector: DVec3,
     place: DVec3,
     along: DVec3,
@@ -94,6 +96,15 @@ pub(super) fn variables(
     Ok(Some(variables.collect()))
 }
 
+/// Whether a widget's opacity varies where s and g rise by so much.
+fn varies(widget: &Widget, rise: [f64; 2]) -> bool {
+    match &widget.shape {
+        Shape::Uniform => false,
+        Shape::Gaussian { .. } => rise != [0.0; 2],
+        Shape::Triangle(wave) | Shape::Sinusoid(wave, _) => wave.axis[0] * rise[0] + wave.axis[1] * rise[1] != 0.0,
+    }
+}
+
 impl Reference<'_> {
     /// What the intervals of the ray from `origin` along `along` emit and absorb, premultiplied RGBA.
     pub(super) fn composite_two(
@@ -110,7 +121,8 @@ impl Reference<'_> {
                     std::array::from_fn(|k| interval.values[0][k] * (1.0 - u) + interval.values[1][k] * u);
                 let [s, g, x, y, z] = v;
                 let place = origin + along * (interval.t[0] + length * u);
-                let sample = Sample { s, g, vector: DVec3::new(x, y, z), place, along };
+                let rise = [0, 1].map(|k| interval.values[1][k] - interval.values[0][k]);
+                let sample = Sample { s, g, rise, vector: DVec3::new(x, y, z), place, along };
                 self.density(&sample).map(|d| d * length)
             };
             for cut in self.cuts(&interval, origin, along).windows(2) {
@@ -147,7 +159,11 @@ impl Reference<'_> {
         match transfer.bivariate().map(Bivariate::source) {
             Some(Source::Widgets(widgets)) => {
                 for widget in widgets.iter().filter(|w| w.holds([at.s, at.g])) {
-                    shine(widget.color.into(), widget.height([at.s, at.g]));
+                    let opacity = widget.height([at.s, at.g]);
+                    // The peak that a ray passes over is solid in one place only: that adds nothing to an integral.
+                    let most = if varies(widget, at.rise) { 1.0 - f64::EPSILON / 2.0 } else { 1.0 };
+                    let is_peak = transfer.convention() == Convention::Opacity && opacity > most;
+                    shine(widget.color.into(), if is_peak { most } else { opacity });
                 }
             }
             Some(Source::Table(table)) => {

@@ -2,10 +2,10 @@
 
 use crate::cast::Volume;
 use crate::cast::volume::BLOCK;
-use crate::gpu::lines::Map;
 #[cfg(test)]
 use crate::gpu::offsets;
 use crate::gpu::rays::{self, FAR};
+use crate::integral::lines::Map;
 use crate::view::{ClippingPlane, Fan, View};
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat3, DVec3};

@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::arrays::INVISIBLE;
 use crate::gpu::buffers::Chunks;
-use crate::gpu::lines::Map;
+use crate::integral::lines::Map;
 use crate::mesh::{Values, with_values};
 
 /// How values lie in the words of the array.

@@ -1,7 +1,7 @@
 //! Values at the corners of voxels, as they are in memory: pairs along x, as the bits that lanes take them from.
 
-use super::lines::Map;
 use super::walk::LANES;
+use crate::integral::lines::Map;
 
 /// Steps that eight rays take before what they pass is looked at.
 pub(super) const STEPS: usize = 16;

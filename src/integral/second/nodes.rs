@@ -34,7 +34,21 @@ pub(super) fn texel(table: &Table, at: [f64; 2]) -> [f64; 4] {
     table.at(at)
 }
 
+/// The greatest opacity below 1.
+const BELOW_ONE: f64 = 1.0 - f64::EPSILON / 2.0;
+
 impl Bounded {
+    /// The greatest opacity that places of a segment may have. A peak of opacity 1 that the segment runs over is solid at
+    /// one place only, which no integral sees; a node there would count as solid for all of its share.
+    fn most(&self, segment: &Segment, convention: Convention) -> f64 {
+        let is_flat = match (&self.widget.shape, &self.wave) {
+            (Shape::Gaussian { .. }, _) => segment.rise == [0.0; 2],
+            (_, Some((wave, _))) => wave.rise(segment.rise) == 0.0,
+            _ => true,
+        };
+        if is_flat || convention == Convention::Extinction { f64::INFINITY } else { BELOW_ONE }
+    }
+
     /// How high it is at places of a segment, in its box or not, as a share of its greatest opacity.
     #[inline(always)]
     fn heights(&self, segment: &Segment, u: Lanes) -> Lanes {
@@ -108,16 +122,16 @@ impl Second {
             (Ready::Widgets(widgets), Some(piece)) => {
                 for &i in piece.active {
                     let bounded = &widgets[i];
-                    let heights = bounded.heights(segment, u);
-                    let a = each(|i| bounded.widget.opacity * heights[i]);
+                    let (heights, most) = (bounded.heights(segment, u), bounded.most(segment, self.convention));
+                    let a = each(|i| (bounded.widget.opacity * heights[i]).min(most));
                     add(bounded.widget.color.map(|c| [c; 4]), a, [1.0; 4]);
                 }
             }
             (Ready::Widgets(widgets), None) => {
                 for bounded in widgets {
                     let holds = u.map(|u| f64::from(bounded.widget.holds(segment.values(u))));
-                    let heights = bounded.heights(segment, u);
-                    let a = each(|i| bounded.widget.opacity * heights[i] * holds[i]);
+                    let (heights, most) = (bounded.heights(segment, u), bounded.most(segment, self.convention));
+                    let a = each(|i| (bounded.widget.opacity * heights[i] * holds[i]).min(most));
                     add(bounded.widget.color.map(|c| [c; 4]), a, holds);
                 }
             }

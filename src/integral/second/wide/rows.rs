@@ -9,15 +9,17 @@ use crate::integral::second::Second;
 use crate::integral::second::closed::{Profile, Turn};
 use crate::integral::second::light::{ANGLES, angle, begins};
 use crate::integral::second::panel::STEP;
-use crate::transfer::bivariate::{self, Sine};
+use crate::transfer::bivariate::{self, Shape, Sine, Widget};
 use crate::transfer::shading::{Highlight, Light, Origin, Shade, Shading};
-use crate::transfer::{Bivariate, TransferFunction};
+use crate::transfer::{Bivariate, Convention, TransferFunction};
 use bytemuck::{Pod, Zeroable};
 
 /// Widgets that shaders have a bit for.
 const MOST_WIDGETS: usize = 32;
 /// Lights that shaders go through: as many as are left of the loops that devices in software make.
 const MOST_LAMPS: usize = 32;
+/// The opacity under the opacity convention beyond which shaders do not tell the logarithm of a round peak well enough.
+const ROUND_PEAK: f64 = 0.99999;
 /// Stands for infinity, which arithmetic on devices need not know.
 const BEYOND: f32 = 1e30;
 
@@ -91,17 +93,23 @@ pub(crate) struct Panels {
 pub(crate) fn lacks(transfer: &TransferFunction, two: &Two) -> Option<&'static str> {
     let shading = transfer.shading();
     let widgets = match transfer.bivariate().map(Bivariate::source) {
-        Some(bivariate::Source::Widgets(all)) => all.len(),
-        _ => 0,
+        Some(bivariate::Source::Widgets(all)) => all.as_slice(),
+        _ => &[],
     };
+    let is_round = |widget: &Widget| matches!(widget.shape, Shape::Gaussian { .. } | Shape::Sinusoid(..));
     if two.method != Method::Adaptive {
         return Some("segments in closed form or in equal pieces");
     }
     if two.silhouettes == Silhouettes::Published && shading.is_some_and(|s| s.silhouette().is_some()) {
         return Some("silhouettes of whole segments");
     }
-    if widgets > MOST_WIDGETS {
+    if widgets.len() > MOST_WIDGETS {
         return Some("more than 32 widgets");
+    }
+    if transfer.convention() == Convention::Opacity
+        && widgets.iter().any(|widget| is_round(widget) && widget.opacity > ROUND_PEAK)
+    {
+        return Some("round peaks of opacity 1 under the opacity convention");
     }
     if shading.is_some_and(|s| s.lights().len() > MOST_LAMPS) {
         return Some("more than 32 lights");
