@@ -11,6 +11,7 @@ macro_rules! offsets {
 pub(crate) use offsets;
 
 pub(crate) mod arrays;
+pub(crate) mod bands;
 pub(crate) mod buffers;
 pub(crate) mod clock;
 pub mod construct;

@@ -372,7 +372,10 @@ fn devices_draw_the_pictures_of_the_walk() {
                 for (from, view) in &views {
                     let got = renderer.render(view, &|_| ()).unwrap();
                     let stats = renderer.stats();
-                    assert_eq!((&*stats.device, &*stats.integral), ("gpu", "adaptive"), "{name}");
+                    // Round peaks of opacity 1 are left to the CPU.
+                    let round = ["full raised sine, opacity", "full gaussian, opacity"].contains(&name);
+                    let device = if round { "cpu" } else { "gpu" };
+                    assert_eq!((&*stats.device, &*stats.integral), (device, "adaptive"), "{name}");
                     assert!(stats.cpu_rays <= 2, "{name}, {of_mesh}, {from}: {} rays are left", stats.cpu_rays);
                     let wanted = walk.render(view, &|_| ()).unwrap();
                     report.hold(&format!("{name}, {of_mesh}, {from}, {engine:?}"), &got, &wanted, ON_DEVICES);

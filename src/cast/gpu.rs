@@ -11,12 +11,12 @@ mod texels;
 use super::ray::{self, Frame, Visible, least_light};
 use super::reconstruction::{Order, Reconstruction, Sampling};
 use super::volume::{BLOCK, Samples};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::gpu::arrays::{self, INVISIBLE};
+use crate::gpu::bands::{Bands, Drawn};
 use crate::gpu::buffers::{Buffer, Chunks};
-use crate::gpu::clock::Clock;
 use crate::gpu::lines::Lines;
-use crate::gpu::raster::{Readback, Slot};
+use crate::gpu::raster::Slot;
 use crate::gpu::rays::FAR;
 use crate::gpu::shader::{self, ShaderArray};
 use crate::gpu::stretch::{self, StretchVariant};
@@ -27,7 +27,7 @@ use frame::{CastUniforms, FINEST, fineness, planes_of};
 use rayon::prelude::*;
 use std::fmt::Write;
 use texels::Texel;
-use wgpu::{BufferUsages as Usage, ShaderStages as Stages};
+use wgpu::ShaderStages as Stages;
 
 const CAST: &str = include_str!("../../shaders/cast.wgsl");
 
@@ -250,7 +250,6 @@ fn cast(
     chunks: [&Chunks; 4],
 ) -> Result<CastFrame> {
     let Frame { volume, samples, view, reconstruction, .. } = *frame;
-    let [w, h] = view.size();
     let texel = Texel::of(&samples.values);
     let maps = [0, 1, 2, 3].map(|k| if texel.is_plain() { function.maps[k] } else { held[k].then(&function.maps[k]) });
     let (mut uniforms, planes, ends) = frame::uniforms(volume, view, samples.of_cells, &maps);
@@ -261,59 +260,19 @@ fn cast(
     if let Sampling::Steps(step) = reconstruction.sampling {
         uniforms.pace = (step * volume.scale) as f32;
     }
-    let rows = (RAYS / u64::from(w)).clamp(1, u64::from(h)) as u32;
-    let size = u64::from(w) * u64::from(rows) * 16;
-    let frame_buffer = Buffer::new(gpu, "frame", size_of::<CastUniforms>() as u64, Usage::UNIFORM | Usage::COPY_DST)?;
-    let planes = Buffer::holding(gpu, "planes", &planes, Usage::STORAGE)?;
-    let ends = Buffer::holding(gpu, "ends", &ends, Usage::STORAGE)?;
-    let pixels = Buffer::new(gpu, "pixels", size, Usage::STORAGE | Usage::COPY_SRC)?;
-    let counts = Buffer::new(gpu, "counts", 16, Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST)?;
-    let back = Readback::new(gpu, size + 32)?;
+    let bands = Bands::new::<CastUniforms>(gpu, view.size(), RAYS, &planes, &ends)?;
     let [parameters, lines, buckets] = &function.buffers;
-    let own = [parameters, lines, buckets, &frame_buffer, &planes, &ends, &pixels, &counts];
+    let own = [parameters, lines, buckets].into_iter().chain(bands.bindings());
     let own = raster::group_of(gpu, &program.layouts[0], own);
     let shared = raster::group_of(gpu, &program.layouts[1], chunks.into_iter().flat_map(|c| &c.buffers));
-    let clock = Clock::of_one_pass(gpu)?;
-
-    let mut drawn = CastFrame { pixels: vec![], steps: 0, by_cpu: 0, device_ms: None };
-    drawn.pixels.reserve_exact(w as usize * h as usize);
-    for first_row in (0..h).step_by(rows as usize) {
-        let rows = rows.min(h - first_row);
+    let mut steps = 0;
+    let band = |first_row, rows| {
         (uniforms.first_row, uniforms.rows) = (first_row, rows);
-        frame_buffer.write(gpu, 0, bytemuck::bytes_of(&uniforms));
-        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.clear_buffer(&counts.raw, 0, None);
-        {
-            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-                label: Some("cast"),
-                timestamp_writes: clock.as_ref().and_then(|c| c.compute(0)),
-            });
-            pass.set_pipeline(&program.pipeline);
-            pass.set_bind_group(0, &own, &[]);
-            pass.set_bind_group(1, &shared, &[]);
-            pass.dispatch_workgroups(w.div_ceil(8), rows.div_ceil(8), 1);
-        }
-        encoder.copy_buffer_to_buffer(&pixels.raw, 0, back.raw(), 0, size);
-        encoder.copy_buffer_to_buffer(&counts.raw, 0, back.raw(), size, 16);
-        if let Some(clock) = &clock {
-            clock.resolve_one_pass(&mut encoder, back.raw(), size + 16);
-        }
-        back.submit(gpu, encoder, |bytes| {
-            let (image, rest) = bytes.split_at(size as usize);
-            drawn.pixels.extend_from_slice(&bytemuck::cast_slice(image)[..w as usize * rows as usize]);
-            let [steps, carry]: [u32; 2] = bytemuck::pod_read_unaligned(&rest[..8]);
-            drawn.steps += u64::from(carry) << 32 | u64::from(steps);
-            if clock.is_some() {
-                let [start, end]: [u64; 2] = bytemuck::pod_read_unaligned(&rest[16..32]);
-                let ms = end.saturating_sub(start) as f64 * f64::from(gpu.queue.get_timestamp_period()) / 1e6;
-                drawn.device_ms = Some(drawn.device_ms.unwrap_or(0.0) + ms);
-            }
-        })?;
-        if (frame.progress)(f64::from(first_row + rows) / f64::from(h)).is_break() {
-            return Err(Error::Aborted);
-        }
-    }
-    Ok(drawn)
+        uniforms
+    };
+    let count = |[low, carry, _, _]: [u32; 4]| steps += u64::from(carry) << 32 | u64::from(low);
+    let Drawn { pixels, device_ms } = bands.draw(&program.pipeline, &[&own, &shared], band, count, frame.progress)?;
+    Ok(CastFrame { pixels, steps, by_cpu: 0, device_ms })
 }
 
 /// The whole program.

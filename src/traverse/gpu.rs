@@ -6,10 +6,10 @@ use super::cpu::{Counts, least_transmittance};
 use crate::error::{Error, Result};
 use crate::geometry::boundary::{BoundaryFace, LEAF};
 use crate::geometry::{Cell, TetMesh, Values};
+use crate::gpu::bands::{Bands, Drawn};
 use crate::gpu::buffers::{Buffer, Chunks};
-use crate::gpu::clock::Clock;
 use crate::gpu::function;
-use crate::gpu::raster::{Readback, Slot};
+use crate::gpu::raster::Slot;
 use crate::gpu::rays::{self, FAR};
 use crate::gpu::scene::DeviceScene;
 use crate::gpu::second::Held;
@@ -22,8 +22,9 @@ use crate::view::{Blend, View};
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 use rayon::prelude::*;
+use std::ops::ControlFlow;
 use std::sync::Arc;
-use wgpu::{BufferUsages as Usage, ShaderStages as Stages};
+use wgpu::ShaderStages as Stages;
 
 const TRAVERSE: &str = include_str!("../../shaders/traverse.wgsl");
 
@@ -329,64 +330,22 @@ impl Traverse {
             most_steps: geometry.cells.len() as u32,
             most_work: if gpu.adapter.is_software() { LLVMPIPE_WORK } else { u32::MAX },
         };
-        let rows = (RAYS / u64::from(w)).clamp(1, u64::from(h)) as u32;
-        let size = u64::from(w) * u64::from(rows) * 16;
-        let frame_buffer =
-            Buffer::new(gpu, "frame", size_of::<RayUniforms>() as u64, Usage::UNIFORM | Usage::COPY_DST)?;
-        let planes = Buffer::holding(gpu, "planes", &planes, Usage::STORAGE)?;
-        let ends = Buffer::holding(gpu, "ends", &ends, Usage::STORAGE)?;
-        let pixels = Buffer::new(gpu, "pixels", size, Usage::STORAGE | Usage::COPY_SRC)?;
-        let counts = Buffer::new(gpu, "counts", 16, Usage::STORAGE | Usage::COPY_SRC | Usage::COPY_DST)?;
-        let back = Readback::new(gpu, size + 32)?;
+        let bands = Bands::new::<RayUniforms>(gpu, view.size(), RAYS, &planes, &ends)?;
         let [parameters, knots, buckets] = function;
-        let own = [parameters, knots, buckets, &frame_buffer, &planes, &ends, &pixels, &counts];
+        let own = [parameters, knots, buckets].into_iter().chain(bands.bindings());
         let own = raster::group_of(gpu, &self.layout, own);
         let shared = raster::group_of(gpu, group_layout, chunks.iter().flat_map(|c| &c.buffers));
-        let clock = Clock::of_one_pass(gpu)?;
-
-        let mut drawn = WalkedFrame {
-            pixels: Vec::with_capacity(w as usize * h as usize),
-            counts: Counts::default(),
-            device_ms: None,
+        let groups: Vec<_> = [&own, &shared].into_iter().chain(third).collect();
+        let mut counts = Counts::default();
+        let band = |first_row, rows| RayUniforms { first_row, rows, ..frame };
+        let count = |read: [u32; 4]| {
+            let c: RawCounts = bytemuck::cast(read);
+            counts.steps += u64::from(c.carry) << 32 | u64::from(c.steps);
+            counts.retraced += u64::from(c.retraced);
+            counts.panels += u64::from(c.panels);
         };
-        for first_row in (0..h).step_by(rows as usize) {
-            let rows = rows.min(h - first_row);
-            frame_buffer.write(gpu, 0, bytemuck::bytes_of(&RayUniforms { first_row, rows, ..frame }));
-            let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-            encoder.clear_buffer(&counts.raw, 0, None);
-            {
-                let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-                    label: Some("traverse"),
-                    timestamp_writes: clock.as_ref().and_then(|c| c.compute(0)),
-                });
-                pass.set_pipeline(pipeline);
-                pass.set_bind_group(0, &own, &[]);
-                pass.set_bind_group(1, &shared, &[]);
-                if let Some(third) = third {
-                    pass.set_bind_group(2, third, &[]);
-                }
-                pass.dispatch_workgroups(w.div_ceil(8), rows.div_ceil(8), 1);
-            }
-            encoder.copy_buffer_to_buffer(&pixels.raw, 0, back.raw(), 0, size);
-            encoder.copy_buffer_to_buffer(&counts.raw, 0, back.raw(), size, 16);
-            if let Some(clock) = &clock {
-                clock.resolve_one_pass(&mut encoder, back.raw(), size + 16);
-            }
-            back.submit(gpu, encoder, |bytes| {
-                let (image, rest) = bytes.split_at(size as usize);
-                drawn.pixels.extend_from_slice(&bytemuck::cast_slice(image)[..w as usize * rows as usize]);
-                let c: RawCounts = bytemuck::pod_read_unaligned(&rest[..16]);
-                drawn.counts.steps += u64::from(c.carry) << 32 | u64::from(c.steps);
-                drawn.counts.retraced += u64::from(c.retraced);
-                drawn.counts.panels += u64::from(c.panels);
-                if clock.is_some() {
-                    let [start, end]: [u64; 2] = bytemuck::pod_read_unaligned(&rest[16..32]);
-                    let ms = end.saturating_sub(start) as f64 * f64::from(gpu.queue.get_timestamp_period()) / 1e6;
-                    drawn.device_ms = Some(drawn.device_ms.unwrap_or(0.0) + ms);
-                }
-            })?;
-        }
-        Ok(drawn)
+        let Drawn { pixels, device_ms } = bands.draw(pipeline, &groups, band, count, &|_| ControlFlow::Continue(()))?;
+        Ok(WalkedFrame { pixels, counts, device_ms })
     }
 }
 

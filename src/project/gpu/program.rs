@@ -158,9 +158,7 @@ pub(super) fn program(
 ) -> String {
     let drawn = DrawSettings { options, blend };
     let text = constants(variant, association, drawn, layout, table, limits, arrays);
-    let [primitives, drawing] = forms_of(options);
-    let [cells, primitives, drawing] = [CELLS, primitives, drawing].map(|of| shader::with(of, &[]));
-    [&text, shader::CELL, shader::INTEGRAL, TABLE, SHARED, LINES, &cells, &primitives, SHADE, &drawing].join("\n")
+    joined(&text, options, &[], ["", ""])
 }
 
 /// The whole program for functions of two variables, and light.
@@ -177,17 +175,18 @@ pub(super) fn program_of_two(
     text += &constants(&variant, association, drawn, layout, None, limits, arrays);
     let _ = writeln!(text, "const COARSE = {COARSE:?}f;");
     let defined = second::defined(&rows.forms);
-    let [primitives, drawing] = forms_of(drawn.options);
-    let [cells, primitives, drawing, own] = [CELLS, primitives, drawing, SECOND].map(|of| shader::with(of, &defined));
     // Fragments have no other second group.
     let integral = second::program(rows).replace("@group(2)", "@group(1)");
-    [&text, shader::CELL, shader::INTEGRAL, &integral, TABLE, SHARED, LINES, &cells, &primitives, SHADE, &drawing, &own]
-        .join("\n")
+    joined(&text, drawn.options, &defined, [&integral, SECOND])
 }
 
-/// How primitives of a form are made, and drawn.
-fn forms_of(options: &ProjectionOptions) -> [&'static str; 2] {
-    if options.fragments == Fragments::Intersected { INTERSECTED } else { INTERPOLATED }
+/// All parts of a program behind what precedes it; last what finds the integral of two variables, and what asks for it.
+fn joined(text: &str, options: &ProjectionOptions, defined: &[&str], [integral, second]: [&str; 2]) -> String {
+    // How primitives are made, and drawn.
+    let [primitives, drawing] = if options.fragments == Fragments::Intersected { INTERSECTED } else { INTERPOLATED };
+    let [cells, primitives, drawing, second] = [CELLS, primitives, drawing, second].map(|of| shader::with(of, defined));
+    let shared = [text, shader::CELL, shader::INTEGRAL, integral, TABLE, SHARED, LINES];
+    [&shared[..], &[&cells, &primitives, SHADE, &drawing, &second]].concat().join("\n")
 }
 
 /// What precedes all programs: constants, primitives and the mesh's arrays.

@@ -8,6 +8,7 @@ use crate::gpu::rays::double_single;
 use crate::gpu::testing::{gpu, validated};
 use crate::integral::Light;
 use crate::traverse::gpu::*;
+use wgpu::BufferUsages as Usage;
 use wgpu::naga;
 
 const KINDS: [Kind; 3] = [Kind::Scalar, Kind::Pair, Kind::Rgba];
