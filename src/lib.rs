@@ -29,8 +29,7 @@
 //!    grids have a caster of their own.
 //! 6. [`image::Image`] holds the result: linear premultiplied RGBA, 32-bit float.
 //!
-//! [`render::Renderer`] is the whole flow behind one door, [`host::Session`] that door inside another program; with the
-//! feature `ffi` it opens to C++. [`scene`] describes a picture in a JSON file, and
+//! [`render::Renderer`] is the whole flow behind one door, [`host::Session`] that door inside another program. [`scene`] describes a picture in a JSON file, and
 //! [`mod@reference`] is the slow float64 renderer that the tests compare the engines with.
 
 mod buckets;
@@ -38,8 +37,6 @@ pub mod cast;
 pub mod cell;
 pub mod engine;
 pub mod error;
-#[cfg(feature = "ffi")]
-pub mod ffi;
 pub mod field;
 pub mod geometry;
 pub mod gpu;

@@ -15,12 +15,12 @@ def ask(*arguments):
 
 
 linked = {tuple(line.split()[:2]) for line in
-          ask("tree", "--locked", "--edges", "normal", "--features", "ffi", "--prefix", "none").splitlines() if line}
-packages = json.loads(ask("metadata", "--locked", "--format-version", "1", "--features", "ffi"))["packages"]
+          ask("tree", "--locked", "--edges", "normal", "--package", "halite-bridge", "--prefix", "none").splitlines() if line}
+packages = json.loads(ask("metadata", "--locked", "--format-version", "1"))["packages"]
 
 out = ["Halite contains the following software.\n"]
 for p in sorted(packages, key=lambda p: (p["name"], p["version"])):
-    if p["name"] == "halite" or (p["name"], "v" + p["version"]) not in linked:
+    if p["name"] in ("halite", "halite-bridge") or (p["name"], "v" + p["version"]) not in linked:
         continue
     out.append("=" * 100)
     out.append(f"{p['name']} {p['version']}: {p['license'] or p['license_file']}")

@@ -7,7 +7,7 @@
 // rust::Error is not in the header of the bridge.
 #include "rust/cxx.h"
 
-#include "halite/src/ffi.rs.h"
+#include "halite-bridge/src/lib.rs.h"
 
 #include <cstdint>
 #include <utility>

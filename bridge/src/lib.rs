@@ -10,23 +10,24 @@
 mod grids;
 mod meshes;
 mod numbers;
+mod own;
 mod transfer;
 mod views;
 
-use crate::error::{Error, Result};
-use crate::field::{Association, Component, Field};
-use crate::grid::Grid;
-use crate::host::{Log, Session, carried, guard, named};
-use crate::image::{Backdrop, Image};
-use crate::integral::IntegrationOptions;
-use crate::integral::options::Form;
-use crate::memory;
-use crate::mesh::{Array, Cells, Mesh, Polyhedra};
 use bridge::{FieldSpec, IntegralSpec, Numbers, Stats, TransferSpec, Type, ViewSpec};
 use glam::DMat4;
 use grids::{add_grid_array, new_grid, set_grid};
+use halite::error::{Error, Result};
+use halite::field::{Association, Component, Field};
+use halite::host::{carried, guard, named};
+use halite::image::{Backdrop, Image};
+use halite::integral::IntegrationOptions;
+use halite::integral::options::Form;
+use halite::memory;
+use halite::mesh::{Array, Cells, Polyhedra};
 use meshes::{array, array_values, arrays, cell_counts, connectivity, offsets, points, types};
 use numbers::{cast, indices, point_ids, triples, values};
+use own::{Grid, Log, Mesh, Session};
 use std::path::Path;
 use transfer::transfer;
 use views::view;
@@ -241,7 +242,7 @@ mod bridge {
 use bridge::Progress;
 
 fn new_log() -> Result<Box<Log>> {
-    guard(|| Ok(Box::default()))
+    guard(|| Ok(halite::host::Log::default().into()))
 }
 
 fn take_lines(log: &Log) -> Result<Vec<String>> {
@@ -252,8 +253,8 @@ fn open_mesh(path: &str, threads: usize, log: &Log) -> Result<Box<Mesh>> {
     guard(|| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let pool = pool.map_err(|e| Error::Render(format!("cannot start {threads} threads: {e}")))?;
-        let open = || crate::io::open(Path::new(path), &|_| ());
-        log.collect(|| pool.install(carried(open))).map(Box::new)
+        let open = || halite::io::open(Path::new(path), &|_| ());
+        log.collect(|| pool.install(carried(open))).map(Box::from)
     })
 }
 
@@ -265,7 +266,7 @@ fn new_mesh(points: Numbers, types: &[u8], offsets: Numbers, connectivity: Numbe
             offsets: indices("offsets", offsets)?,
             connectivity,
         };
-        Mesh::new(triples(&points)?, cells, vec![], vec![]).map(Box::new)
+        halite::Mesh::new(triples(&points)?, cells, vec![], vec![]).map(Box::from)
     })
 }
 
@@ -287,7 +288,7 @@ fn add_array(mesh: &mut Mesh, name: &str, of_cells: bool, components: usize, num
 }
 
 fn new_session(threads: usize, device: &str, engine: &str, log: &Log) -> Result<Box<Session>> {
-    guard(|| Session::new(threads, device, engine, log.clone()).map(Box::new))
+    guard(|| halite::host::Session::new(threads, device, engine, halite::host::Log::clone(log)).map(Box::from))
 }
 
 fn set_integral(session: &mut Session, spec: IntegralSpec) -> Result<()> {

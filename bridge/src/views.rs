@@ -2,9 +2,9 @@
 
 use super::bridge::{CameraSpec, ViewSpec};
 use super::rows;
-use crate::error::{Error, Result};
-use crate::view::{Blend, Camera, ClippingPlane, Cropping, DepthBuffer, DepthKind, Projection, View};
 use glam::DVec3;
+use halite::error::{Error, Result};
+use halite::view::{Blend, Camera, ClippingPlane, Cropping, DepthBuffer, DepthKind, Projection, View};
 
 /// The view that a specification describes.
 ///

@@ -220,7 +220,7 @@ fn standard_input_and_output() {
 }
 
 fn case(name: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/cases").join(name);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/cases").join(name);
     if path.exists() {
         return path.canonicalize().ok();
     }

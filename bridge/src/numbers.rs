@@ -1,10 +1,10 @@
 //! Numbers of a type that is known only when the program runs, as Rust's.
 
 use super::bridge::{Numbers, Type};
-use crate::error::{Error, Result};
-use crate::memory;
-use crate::mesh::{Values, with_values};
 use glam::DVec3;
+use halite::error::{Error, Result};
+use halite::memory;
+use halite::mesh::Values;
 use rayon::prelude::*;
 
 /// The numbers of a slice that is known to hold some type.
@@ -48,7 +48,6 @@ fn copied<T: bytemuck::Pod>(numbers: &Numbers) -> Result<Vec<T>> {
 }
 
 /// Points, of coordinates of any type.
-#[allow(clippy::cast_lossless, clippy::unnecessary_cast, reason = "one cast for ten types")]
 pub(super) fn triples(numbers: &Numbers) -> Result<Vec<DVec3>> {
     let count = numbers.bytes.len() / size_of(numbers.kind);
     if !count.is_multiple_of(3) {
@@ -61,9 +60,10 @@ pub(super) fn triples(numbers: &Numbers) -> Result<Vec<DVec3>> {
             let points = cast::<f32>(numbers)?.as_chunks().0;
             Ok(points.par_iter().map(|p: &[f32; 3]| DVec3::from_array(p.map(f64::from))).collect())
         }
-        _ => with_values!(&values(numbers)?, v => {
-            Ok(v.as_chunks().0.iter().map(|p: &[_; 3]| DVec3::from_array(p.map(|x| x as f64))).collect())
-        }),
+        _ => {
+            let values = values(numbers)?;
+            Ok((0..count / 3).map(|p| DVec3::from_array([0, 1, 2].map(|k| values.get(3 * p + k)))).collect())
+        }
     }
 }
 

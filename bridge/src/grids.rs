@@ -2,12 +2,12 @@
 
 use super::bridge::Numbers;
 use super::numbers::values;
+use super::own::{Grid, Session};
 use super::rows;
-use crate::error::Result;
-use crate::grid::Grid;
-use crate::host::{Session, guard};
-use crate::mesh::Array;
 use glam::{DMat3, DMat4, DVec3};
+use halite::error::Result;
+use halite::host::guard;
+use halite::mesh::Array;
 
 pub(super) fn new_grid(x: Numbers, y: Numbers, z: Numbers, origin: [f64; 3], direction: [f64; 9]) -> Result<Box<Grid>> {
     guard(|| {
@@ -17,7 +17,9 @@ pub(super) fn new_grid(x: Numbers, y: Numbers, z: Numbers, origin: [f64; 3], dir
         };
         let mut place = DMat4::from_mat3(DMat3::from_cols_array(&direction).transpose());
         place.w_axis = DVec3::from_array(origin).extend(1.0);
-        Grid::rectilinear([floats(x)?, floats(y)?, floats(z)?], vec![], vec![])?.transformed(place).map(Box::new)
+        halite::Grid::rectilinear([floats(x)?, floats(y)?, floats(z)?], vec![], vec![])?
+            .transformed(place)
+            .map(Box::from)
     })
 }
 

@@ -1,11 +1,11 @@
 //! Transfer functions, as C++ describes them.
 
 use super::bridge::{LightKind, LightSpec, ShadeSpec, TransferSpec};
-use crate::error::{Error, Result};
-use crate::scene::widget;
-use crate::transfer::bivariate::Table;
-use crate::transfer::shading::{Cone, Highlight, Light, Origin, Shade, Shading};
-use crate::transfer::{Bivariate, Convention, TransferFunction};
+use halite::error::{Error, Result};
+use halite::scene::widget;
+use halite::transfer::bivariate::Table;
+use halite::transfer::shading::{Cone, Highlight, Light, Origin, Shade, Shading};
+use halite::transfer::{Bivariate, Convention, TransferFunction};
 
 /// The function that a specification describes.
 ///

@@ -1,12 +1,12 @@
 //! What C++ asks a mesh.
 
 use super::bridge::{ArrayInfo, CellCount, Type};
-use crate::error::{Error, Result};
-use crate::host::guard;
-use crate::memory;
-use crate::mesh::cells::name;
-use crate::mesh::{Array, Mesh, Values};
 use glam::DVec3;
+use halite::error::{Error, Result};
+use halite::host::guard;
+use halite::memory;
+use halite::mesh::cells::name;
+use halite::mesh::{Array, Mesh, Values};
 
 /// Arrays of points first, then those of cells.
 fn all_arrays(mesh: &Mesh) -> impl Iterator<Item = (bool, &Array)> {

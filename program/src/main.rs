@@ -30,7 +30,7 @@ use std::process::ExitCode;
 
 /// Draws unstructured grids as volumes: every pixel is the integral of the field that the mesh defines.
 #[derive(Parser)]
-#[command(version, arg_required_else_help = true, max_term_width = 110)]
+#[command(name = "halite", version, arg_required_else_help = true, max_term_width = 110)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
