@@ -1,11 +1,11 @@
-use crate::drawn::{self, Times, ms};
-use crate::render::{self, Job, Request};
-use crate::{camera, output, progress};
 use anyhow::{Context, Result};
 use clap::Args;
 use halite::gpu::{self, DeviceChoice};
 use halite::render::{ProjectionStats, Renderer, Stats};
 use halite::view::View;
+use halite_console::drawn::{self, Times, ms};
+use halite_console::request::{self, Job, Request};
+use halite_console::{camera, output, progress};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -61,7 +61,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     // Engine and projection options of a scene hold for all devices.
     let scene = given.clone();
     let mut renderer = options.request.renderer(threads, scene.as_ref(), choice.clone())?;
-    let job = renderer.install(|| render::prepare(&options.request, given))?;
+    let job = renderer.install(|| request::prepare(&options.request, given))?;
     let first = measure(options, &job, &mut renderer)?;
     let mut runs = vec![first];
     drop(renderer);

@@ -1,10 +1,10 @@
-use crate::render::Job;
-use crate::{drawn, output};
 use anyhow::Result;
 use clap::Args;
 use halite::mesh::{cells::Tetrahedra, generate};
 use halite::render::Renderer;
 use halite::scene::{Scalars, automatic};
+use halite_console::request::Job;
+use halite_console::{drawn, output};
 use std::path::PathBuf;
 
 /// Draw a built-in mesh, to see that everything works

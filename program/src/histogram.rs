@@ -1,8 +1,5 @@
 //! `halite histogram`: how much of a mesh has which scalar and gradient, as a picture.
 
-use crate::legend::{Canvas, numbers};
-use crate::output;
-use crate::render::{self, Request};
 use anyhow::{Context, Result};
 use clap::Args;
 use embedded_graphics::mono_font::iso_8859_1::FONT_6X10;
@@ -12,6 +9,9 @@ use halite::image::{Backdrop, Image};
 use halite::render::Renderer;
 use halite::transfer::Axis;
 use halite::transfer::bivariate::{Bivariate, Source, Widget};
+use halite_console::legend::{Canvas, numbers};
+use halite_console::output;
+use halite_console::request::{self, Request};
 use std::path::PathBuf;
 
 /// Draw the joint histogram of a scalar and its gradient's length
@@ -43,7 +43,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     let size = options.request.size.unwrap_or(BINS).map(|n| n as usize);
     let renderer = Renderer::with_device(threads, DeviceChoice::Cpu)?;
     let image = renderer.install(|| {
-        let job = render::prepare(&options.request, given)?;
+        let job = request::prepare(&options.request, given)?;
         let histogram = match &job.grid {
             Some(grid) => halite::cast::histogram(grid, &job.field, size),
             None => {

@@ -1,6 +1,5 @@
 mod grid;
 
-use crate::{input, output, parse, progress};
 use anyhow::Result;
 use clap::Args;
 use halite::field::{Association, Gradient};
@@ -11,6 +10,7 @@ use halite::mesh::cells::{self, Listed, Tetrahedra};
 use halite::mesh::faces::Faces;
 use halite::mesh::{Array, Attributes, LeftOut, Mesh, Role, Values};
 use halite::scene::automatic;
+use halite_console::{input, output, parse, progress};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::fmt::Write;

@@ -2,29 +2,18 @@
 
 mod allocator;
 mod bench;
-mod camera;
 mod demo;
-mod drawn;
 mod histogram;
 mod info;
-mod input;
-mod integral;
-mod legend;
-mod look;
-mod output;
-mod parse;
-mod progress;
 mod render;
-mod second;
 mod steps;
-mod study;
-mod tables;
-mod variant;
 
 use anyhow::Result;
 use clap::{ArgAction, CommandFactory, FromArgMatches, Parser, Subcommand};
 use halite::gpu::DeviceChoice;
 use halite::render::Renderer;
+use halite_console::{output, parse};
+use halite_study::{sheets, tables};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -47,7 +36,7 @@ enum Command {
     Render(Box<render::Options>),
     Info(info::Options),
     Bench(Box<bench::Options>),
-    Study(Box<study::Options>),
+    Study(Box<sheets::Options>),
     Tables(Box<tables::Options>),
     Histogram(Box<histogram::Options>),
     Demo(demo::Options),
@@ -108,7 +97,7 @@ fn run(cli: Cli) -> Result<()> {
             Renderer::with_device(cli.threads, DeviceChoice::Cpu)?.install(|| info::run(&options))
         }
         Command::Bench(options) => bench::run(&options, cli.threads),
-        Command::Study(options) => study::run(&options, cli.threads),
+        Command::Study(options) => sheets::run(&options, cli.threads),
         Command::Tables(options) => tables::run(&options, cli.threads),
         Command::Histogram(options) => histogram::run(&options, cli.threads),
         Command::Demo(options) => demo::run(&options, &mut Renderer::new(cli.threads)?),

@@ -1,23 +1,13 @@
 //! Pictures of all time steps.
 
-use crate::render::{Options, Request, picture, prepare_step};
-use crate::{input, output};
+use crate::render::{Options, picture};
 use anyhow::{Context, Result};
 use halite::io::Time;
 use halite::mesh::cells::Tetrahedra;
 use halite::render::Renderer;
-use halite::scene::{Scalars, Scene, automatic};
-use halite::transfer::TransferFunction;
-use halite::view::Camera;
-
-/// What is the same for all time steps, once the first is known.
-#[derive(Default)]
-pub(crate) struct Steps {
-    pub(crate) time: Option<Time>,
-    pub(crate) values: Option<[f64; 2]>,
-    pub(crate) scalars: Option<Scalars>,
-    pub(crate) look: Option<(TransferFunction, Camera)>,
-}
+use halite::scene::{Scene, automatic};
+use halite_console::request::{Request, Steps, prepare_step};
+use halite_console::{input, output};
 
 /// Draws all time steps, with the colours, opacities and view of the first over the range of all.
 pub(crate) fn draw(options: &Options, given: Option<Scene>, renderer: &mut Renderer) -> Result<serde_json::Value> {

@@ -9,7 +9,7 @@ const STEPS: f64 = 1000.0;
 const TICK: Duration = Duration::from_millis(200);
 
 /// Runs `work`, and shows the share of it that it says is done.
-pub(crate) fn during<T>(what: &'static str, work: impl FnOnce(&(dyn Fn(f64) + Sync)) -> T) -> T {
+pub fn during<T>(what: &'static str, work: impl FnOnce(&(dyn Fn(f64) + Sync)) -> T) -> T {
     let bar = shown(ProgressBar::new(STEPS as u64), what, "{msg:14} {wide_bar} {percent:>3}% {elapsed}");
     let done = work(&|share| bar.set_position((share.clamp(0.0, 1.0) * STEPS) as u64));
     bar.finish_and_clear();

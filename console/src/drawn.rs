@@ -1,31 +1,40 @@
 //! Pictures, and what is reported of them.
 
 use crate::progress;
-use crate::render::Job;
+use crate::request::Job;
 use anyhow::Result;
 use halite::image::{Backdrop, Image};
 use halite::render::{Renderer, Stats};
 use std::time::Instant;
 
 /// A picture, and what it took.
-pub(crate) struct Drawn {
-    pub(crate) image: Image,
-    pub(crate) behind: Option<halite::scene::Backdrop>,
+pub struct Drawn {
+    /// Premultiplied colours.
+    pub image: Image,
+    /// Opaque objects behind the volume.
+    pub behind: Option<halite::scene::Backdrop>,
     stats: Stats,
     times: Times,
 }
 
 /// What the renderer's own statistics do not tell, in ms.
 #[derive(Default)]
-pub(crate) struct Times {
-    pub(crate) load: f64,
-    pub(crate) split: f64,
-    pub(crate) first_frame: f64,
+pub struct Times {
+    /// Reading the mesh.
+    pub load: f64,
+    /// Splitting its cells into tetrahedra.
+    pub split: f64,
+    /// The first picture, with all that is made for it.
+    pub first_frame: f64,
     /// From a change of the transfer function to the frame that shows it.
-    pub(crate) transfer_edit: Option<f64>,
+    pub transfer_edit: Option<f64>,
 }
 
-pub(crate) fn draw(job: Job, renderer: &mut Renderer) -> Result<Drawn> {
+/// Draws a picture.
+///
+/// # Errors
+/// Those of the renderer.
+pub fn draw(job: Job, renderer: &mut Renderer) -> Result<Drawn> {
     let Job { mesh, grid, tetrahedra, field, scene, load_ms, split_ms, .. } = job;
     let (view, behind) = scene.view()?;
     match &grid {
@@ -46,13 +55,14 @@ pub(crate) fn draw(job: Job, renderer: &mut Renderer) -> Result<Drawn> {
 }
 
 impl Drawn {
-    pub(crate) fn report(&self) -> serde_json::Value {
+    /// What `--stats` writes.
+    pub fn report(&self) -> serde_json::Value {
         report(&self.stats, &self.times, self.image.size, self.stats.frame_ms)
     }
 }
 
 /// What is told of frames that took `frame_ms`.
-pub(crate) fn report(s: &Stats, times: &Times, size: [u32; 2], frame_ms: f64) -> serde_json::Value {
+pub fn report(s: &Stats, times: &Times, size: [u32; 2], frame_ms: f64) -> serde_json::Value {
     serde_json::json!({
         "engine": s.engine, "device": s.device, "adapter": s.adapter,
         "size": size, "cells": s.cells, "tetrahedra": s.tetrahedra,
@@ -74,7 +84,7 @@ fn peak_bytes() -> Option<u64> {
 }
 
 /// What an 8-bit picture shows behind the volume: opaque objects, if there are any.
-pub(crate) fn backdrop(background: Option<[f64; 3]>, behind: Option<&[[f32; 3]]>) -> Backdrop<'_> {
+pub fn backdrop(background: Option<[f64; 3]>, behind: Option<&[[f32; 3]]>) -> Backdrop<'_> {
     match (behind, background) {
         (Some(pixels), _) => Backdrop::Pixels(pixels),
         (None, Some(c)) => Backdrop::Color(c.map(|c| c as f32)),
@@ -82,6 +92,7 @@ pub(crate) fn backdrop(background: Option<[f64; 3]>, behind: Option<&[[f32; 3]]>
     }
 }
 
-pub(crate) fn ms(start: Instant) -> f64 {
+/// Milliseconds since `start`.
+pub fn ms(start: Instant) -> f64 {
     start.elapsed().as_secs_f64() * 1e3
 }

@@ -1,12 +1,12 @@
 //! Where on a field the functions of the study are: by the values that most of its points have.
 
-use crate::drawn::ms;
-use crate::render::Job;
 use anyhow::Result;
 use halite::field::Gradient;
 use halite::transfer::bivariate::{OPEN, Shape, Sine, Wave, Widget};
 use halite::transfer::shading::{Light, Shade};
 use halite::transfer::{Bivariate, Shading, TransferFunction};
+use halite_console::drawn::ms;
+use halite_console::request::Job;
 use std::time::Instant;
 
 /// A function, what it is called, the published figure that it stands in, and how it is drawn.

@@ -1,10 +1,10 @@
+//! `halite study`: variants beside what is published.
+
 mod bivariate;
 mod forms;
 mod orders;
 mod reconstructions;
 
-use crate::render::{self, Job, Request};
-use crate::{output, parse, progress};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use embedded_graphics::mono_font::{MonoTextStyle, ascii::FONT_6X10};
@@ -18,6 +18,8 @@ use halite::integral::table::Kind;
 use halite::project::{Fragments, Order, ProjectionOptions, Target, Thickness};
 use halite::render::Renderer;
 use halite::view::View;
+use halite_console::request::{self, Job, Request};
+use halite_console::{output, parse, progress};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -26,7 +28,7 @@ use std::path::PathBuf;
 /// Draws with each published variant and its cure (Kraus, Qiao & Ebert 2004), and writes a sheet of all pictures, each
 /// above its difference from the traverse engine's, with error and time.
 #[derive(Args)]
-pub(crate) struct Options {
+pub struct Options {
     #[command(flatten)]
     request: Request,
     /// The sheet: .png
@@ -127,7 +129,11 @@ fn variants(table: Option<[u32; 3]>) -> Vec<Variant> {
     ]
 }
 
-pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
+/// Draws what the options ask for, and writes the sheet and the figures.
+///
+/// # Errors
+/// Misuse of options, scenes that cannot be read or drawn, and files that cannot be written.
+pub fn run(options: &Options, threads: usize) -> Result<()> {
     output::check_picture(&options.out)?;
     if let Some(path) = &options.json {
         output::check(path)?;
@@ -152,7 +158,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     let size = options.request.studied(given.as_ref())?.or(Some([256, 256, 16]));
     let device = options.request.device(given.as_ref());
     let mut reference = Renderer::with_device(threads, DeviceChoice::Cpu)?;
-    let job = reference.install(|| render::prepare(&options.request, given)?.of_mesh("study"))?;
+    let job = reference.install(|| request::prepare(&options.request, given)?.of_mesh("study"))?;
     let (view, _) = job.scene.view()?;
     let mut renderer = Renderer::with_engine(threads, device, halite::render::Engine::Project)?;
     let truth = progress::during("judging", |p| {

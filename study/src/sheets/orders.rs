@@ -1,8 +1,6 @@
 //! The orders of cells side by side: where each is wrong, and what it takes.
 
 use super::{Options, Row, Variant, check, draw, set, sheet};
-use crate::render::{self, Job};
-use crate::{output, progress};
 use anyhow::{Context, Result};
 use halite::geometry::TetMesh;
 use halite::gpu::DeviceChoice;
@@ -15,6 +13,8 @@ use halite::project::{Cycles, Order, ProjectionOptions};
 use halite::render::{Engine, Renderer};
 use halite::scene::Scene;
 use halite::view::View;
+use halite_console::request::{self, Job};
+use halite_console::{output, progress};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -61,14 +61,14 @@ pub(super) fn run(options: &Options, threads: usize) -> Result<()> {
     let device = options.request.device(given.as_ref());
     let mut reference = Renderer::with_device(threads, DeviceChoice::Cpu)?;
     let mut renderer = Renderer::with_engine(threads, device, Engine::Project)?;
-    let job = reference.install(|| render::prepare(&options.request, given.clone())?.of_mesh("study"))?;
+    let job = reference.install(|| request::prepare(&options.request, given.clone())?.of_mesh("study"))?;
     let first = given.as_ref().map_or(&options.request.input, |scene: &Scene| &scene.mesh).clone();
     let mut all = vec![studied(options, &first, &job, &mut reference, &mut renderer)?];
     drop(job);
     output::print(&table(&all[0]))?;
     for path in &options.also {
         let request = options.request.of(path.clone());
-        let job = reference.install(|| render::prepare(&request, None))?;
+        let job = reference.install(|| request::prepare(&request, None))?;
         if job.grid.is_some() {
             tracing::warn!("{}: passed over, as it is a regular or rectilinear grid", path.display());
             continue;

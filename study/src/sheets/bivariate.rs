@@ -3,8 +3,6 @@
 mod places;
 
 use super::{Options, Row, Sheet, Variant, check, set};
-use crate::render::{self, Job};
-use crate::{output, progress};
 use anyhow::{Context, Result};
 use halite::gpu::DeviceChoice;
 use halite::image::{Backdrop, Image};
@@ -14,6 +12,8 @@ use halite::render::{Engine, Renderer};
 use halite::scene::Scene;
 use halite::transfer::TransferFunction;
 use halite::view::View;
+use halite_console::request::{self, Job};
+use halite_console::{output, progress};
 use places::{As, Places};
 use serde_json::{Value, json};
 use std::path::Path;
@@ -82,7 +82,7 @@ pub(super) fn run(options: &Options, threads: usize) -> Result<()> {
     let given = options.request.scene()?;
     let mut judge = Renderer::with_engine(threads, DeviceChoice::Cpu, Engine::Traverse)?;
     let mut renderer = Renderer::with_engine(threads, DeviceChoice::Cpu, Engine::Project)?;
-    let job = judge.install(|| render::prepare(&options.request, given.clone())?.of_mesh("study"))?;
+    let job = judge.install(|| request::prepare(&options.request, given.clone())?.of_mesh("study"))?;
     let first = given.as_ref().map_or(&options.request.input, |scene: &Scene| &scene.mesh).clone();
     let (studied, places) = studied(options, &first, &job, &mut judge, &mut renderer)?;
     output::print(&table(&studied))?;
@@ -93,7 +93,7 @@ pub(super) fn run(options: &Options, threads: usize) -> Result<()> {
     drop(job);
     for path in &options.also {
         let request = options.request.of(path.clone());
-        let job = judge.install(|| render::prepare(&request, None))?;
+        let job = judge.install(|| request::prepare(&request, None))?;
         if job.grid.is_some() {
             tracing::warn!("{}: passed over, as it is a regular or rectilinear grid", path.display());
             continue;

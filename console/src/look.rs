@@ -1,6 +1,6 @@
 //! Colours and opacities that options ask for.
 
-use crate::render::Request;
+use crate::request::Request;
 use anyhow::{Result, bail};
 use halite::scene::Scene;
 use halite::transfer::Axis;
@@ -11,7 +11,7 @@ use std::path::Path;
 const TOLERANCE: f64 = 1e-4;
 
 /// A colour map by name, or from `FILE.json` or `FILE.json:NAME`; with `_r` behind the name, reversed.
-pub(crate) fn color_map(text: &str) -> Result<ColorMap> {
+pub fn color_map(text: &str) -> Result<ColorMap> {
     let (file, preset) = match text.split_once(".json:") {
         Some((stem, preset)) => (format!("{stem}.json"), Some(preset)),
         None => (text.to_owned(), None),
@@ -27,7 +27,7 @@ pub(crate) fn color_map(text: &str) -> Result<ColorMap> {
 }
 
 /// `scene`, with the transfer function that the options ask for.
-pub(crate) fn restyled(options: &Request, mut scene: Scene, map: Option<ColorMap>) -> Result<Scene> {
+pub fn restyled(options: &Request, mut scene: Scene, map: Option<ColorMap>) -> Result<Scene> {
     let old = scene.transfer.with_unit_distance(options.unit_distance.unwrap_or(scene.transfer.unit_distance()))?;
     let asked = [
         ("--colormap", map.is_some()),

@@ -2,7 +2,7 @@
 
 use super::pictures::Pictures;
 use super::signal::Line;
-use crate::study::Sheet;
+use crate::sheets::Sheet;
 use embedded_graphics::pixelcolor::Rgb888;
 use embedded_graphics::prelude::{Drawable, Point, Primitive, RgbColor, WebColors};
 use embedded_graphics::primitives::{Line as Stroke, PrimitiveStyle};

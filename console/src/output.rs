@@ -10,19 +10,19 @@ use std::path::{Path, PathBuf};
 const PICTURES: [&str; 3] = ["png", "exr", "npy"];
 
 /// Says why the program failed, in one line.
-pub(crate) fn error(error: &anyhow::Error) {
+pub fn error(error: &anyhow::Error) {
     let line = format!("{error:#}").replace('\n', " ");
     // A closed stderr is no reason to panic.
     let _ = writeln!(std::io::stderr(), "halite: {line}");
 }
 
 /// Options that do not go together: the program exits with 2 and says so.
-pub(crate) fn misuse(what: impl std::fmt::Display) -> anyhow::Error {
+pub fn misuse(what: impl std::fmt::Display) -> anyhow::Error {
     clap::Error::raw(clap::error::ErrorKind::ArgumentConflict, format!("{what}\n")).into()
 }
 
 /// Writes `text` to stdout. A reader that has seen enough is no error.
-pub(crate) fn print(text: &str) -> Result<()> {
+pub fn print(text: &str) -> Result<()> {
     match std::io::stdout().write_all(text.as_bytes()) {
         Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(e).context("stdout"),
         _ => Ok(()),
@@ -30,7 +30,7 @@ pub(crate) fn print(text: &str) -> Result<()> {
 }
 
 /// Writes a picture to `path`, or as `format` to stdout.
-pub(crate) fn picture(image: &Image, path: &Path, format: &str, backdrop: Backdrop) -> Result<()> {
+pub fn picture(image: &Image, path: &Path, format: &str, backdrop: Backdrop) -> Result<()> {
     if !is_standard(path) {
         return Ok(image.save(path, backdrop)?);
     }
@@ -40,14 +40,14 @@ pub(crate) fn picture(image: &Image, path: &Path, format: &str, backdrop: Backdr
 }
 
 /// The path of the picture of a time step, of `count`: `name_0007.png` for `name.png`.
-pub(crate) fn numbered(path: &Path, step: usize, count: usize) -> PathBuf {
+pub fn numbered(path: &Path, step: usize, count: usize) -> PathBuf {
     let digits = count.saturating_sub(1).to_string().len().max(4);
     let part = |part: Option<&std::ffi::OsStr>| part.unwrap_or_default().to_string_lossy().into_owned();
     path.with_file_name(format!("{}_{step:0digits$}.{}", part(path.file_stem()), part(path.extension())))
 }
 
 /// As [`check_picture`], where stdout may take a picture, too: a format is what that gets.
-pub(crate) fn check_stream(path: &Path, format: Option<&str>) -> Result<()> {
+pub fn check_stream(path: &Path, format: Option<&str>) -> Result<()> {
     match format {
         _ if is_standard(path) && std::io::stdout().is_terminal() => {
             bail!("stdout is a terminal, which shows no pictures: --out FILE.png, or > FILE.png")
@@ -59,7 +59,7 @@ pub(crate) fn check_stream(path: &Path, format: Option<&str>) -> Result<()> {
 }
 
 /// Fails now if a picture could not be written to `path` later.
-pub(crate) fn check_picture(path: &Path) -> Result<()> {
+pub fn check_picture(path: &Path) -> Result<()> {
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     if !PICTURES.contains(&ending.as_str()) {
         bail!("{}: the picture can be written as .png, .exr or .npy", path.display());
@@ -68,7 +68,7 @@ pub(crate) fn check_picture(path: &Path) -> Result<()> {
 }
 
 /// Fails now if nothing could be written to `path` later.
-pub(crate) fn check(path: &Path) -> Result<()> {
+pub fn check(path: &Path) -> Result<()> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if !folder.is_dir() {
         bail!("{}: there is no folder {}", path.display(), folder.display());

@@ -14,7 +14,7 @@ use std::sync::{Arc, OnceLock};
 const STANDARD: &str = "standard input";
 
 /// Whether a path stands for standard input or output.
-pub(crate) fn is_standard(path: &Path) -> bool {
+pub fn is_standard(path: &Path) -> bool {
     path.as_os_str() == "-"
 }
 
@@ -34,7 +34,7 @@ fn standard() -> Result<Arc<[u8]>> {
 }
 
 /// The file at `path`, opened.
-pub(crate) fn source(path: &Path) -> Result<Source> {
+pub fn source(path: &Path) -> Result<Source> {
     Ok(if is_standard(path) { Source::from_bytes(Path::new(STANDARD), standard()?)? } else { Source::open(path)? })
 }
 
@@ -43,7 +43,7 @@ const MOST_SAMPLES: usize = 1 << 16;
 
 /// The mesh at `path`, at a time step, the first if nobody says; of a regular or rectilinear grid that itself, and a mesh
 /// of some of its cells, which colours and views are chosen by.
-pub(crate) fn mesh(path: &Path, time: Option<Time>) -> Result<(Mesh, Option<Grid>)> {
+pub fn mesh(path: &Path, time: Option<Time>) -> Result<(Mesh, Option<Grid>)> {
     match data_set(path, time)? {
         DataSet::Mesh(mesh) => Ok((mesh, None)),
         DataSet::Grid(grid) => {
@@ -68,7 +68,7 @@ fn data_set(path: &Path, time: Option<Time>) -> Result<DataSet> {
 }
 
 /// The scene at `path`, if it is one and no mesh.
-pub(crate) fn scene(path: &Path) -> Result<Option<Scene>> {
+pub fn scene(path: &Path) -> Result<Option<Scene>> {
     if is_standard(path) {
         let bytes = standard()?;
         let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes).trim_ascii_start();

@@ -11,8 +11,9 @@ use halite::transfer::bivariate::Widget;
 use halite::transfer::shading::{Light, Shade};
 use serde_json::{Map, Value, json};
 
+/// Functions of two variables, light and silhouettes.
 #[derive(Args, Clone)]
-pub(crate) struct Second {
+pub struct Second {
     /// Light the volume by a lamp at the eye, with the gradient as normal: its shares and the highlight's power may follow as
     /// --shade=AMBIENT,DIFFUSE,SPECULAR,POWER
     #[arg(long, value_name = "A,D,S,P", value_parser = parse::shade, num_args = 0..=1, require_equals = true,
@@ -34,7 +35,7 @@ pub(crate) struct Second {
     widget: Vec<Written>,
     /// The array that takes the place of the gradient's length
     #[arg(long, value_name = "NAME", value_parser = parse::name, help_heading = "Second variable and light")]
-    pub(crate) gradient_array: Option<String>,
+    pub gradient_array: Option<String>,
 }
 
 /// A widget as it is written, in the keys of scenes.
@@ -80,13 +81,13 @@ impl Written {
 
 impl Second {
     /// Whether any of it was asked for.
-    pub(crate) fn is_given(&self) -> bool {
+    pub fn is_given(&self) -> bool {
         let function = self.gradient_opacity.is_some() || !self.widget.is_empty() || self.gradient_array.is_some();
         function || self.shade.is_some() || self.silhouette.is_some()
     }
 
     /// Refuses an array that no function looks at, in a picture of `scene` or of a mesh alone.
-    pub(crate) fn check(&self, scene: Option<&Scene>) -> Result<()> {
+    pub fn check(&self, scene: Option<&Scene>) -> Result<()> {
         let asked = self.gradient_opacity.is_some() || !self.widget.is_empty();
         let of_two = asked || scene.is_some_and(|s| s.transfer.bivariate().is_some());
         if self.gradient_array.is_some() && !of_two {
@@ -96,13 +97,13 @@ impl Second {
     }
 
     /// The widgets that were asked for.
-    pub(crate) fn widgets(&self) -> Result<Vec<Widget>> {
+    pub fn widgets(&self) -> Result<Vec<Widget>> {
         let widgets = self.widget.iter().enumerate().map(|(i, w)| w.widget(i));
         widgets.collect::<Result<_, _>>().map_err(|what| output::misuse(format!("--widget: {what}")))
     }
 
     /// `transfer` with what was asked for, of a field whose second variable may be another array.
-    pub(crate) fn apply(
+    pub fn apply(
         &self,
         transfer: TransferFunction,
         mesh: &Mesh,
@@ -131,7 +132,7 @@ impl Second {
 }
 
 /// The least and the greatest of the second variable.
-pub(crate) fn range(mesh: &Mesh, tetrahedra: &Tetrahedra, field: &Field) -> Result<[f64; 2]> {
+pub fn range(mesh: &Mesh, tetrahedra: &Tetrahedra, field: &Field) -> Result<[f64; 2]> {
     if let Some(second) = field.second() {
         return Ok(second.range(0));
     }

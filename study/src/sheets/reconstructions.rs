@@ -5,7 +5,6 @@ mod plot;
 mod signal;
 
 use super::Options;
-use crate::{input, output, progress};
 use anyhow::{Context, Result, bail};
 use halite::cast::{Order, Sampling};
 use halite::field::{Association, Field};
@@ -13,6 +12,7 @@ use halite::grid::Grid;
 use halite::image::Backdrop;
 use halite::mesh::cells::Tetrahedra;
 use halite::scene::{Scene, automatic};
+use halite_console::{input, output, progress};
 use plot::Plot;
 use serde_json::{Value, json};
 use signal::{Random, Samples};

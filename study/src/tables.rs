@@ -1,7 +1,7 @@
+//! `halite tables`: pre-integrated tables of a function.
+
 mod second;
 
-use crate::render::{self, Request};
-use crate::{output, parse, progress};
 use anyhow::{Context, Result};
 use clap::Args;
 use halite::field::Kind;
@@ -13,6 +13,8 @@ use halite::integral::table::{self, Cylindrical, Linear, Polynomial, Sampling, T
 use halite::integral::{Exact, Light};
 use halite::reference;
 use halite::render::Renderer;
+use halite_console::request::{self, Request};
+use halite_console::{output, parse, progress};
 use rayon::prelude::*;
 use serde_json::json;
 use std::path::PathBuf;
@@ -24,7 +26,7 @@ use std::time::Instant;
 /// that took, and its errors against adaptive integration in 64 bits, over segments with any values and lengths. With
 /// --device, a device builds them too. Second-order tables are for slabs along which the value is a parabola.
 #[derive(Args)]
-pub(crate) struct Options {
+pub struct Options {
     #[command(flatten)]
     request: Request,
     /// Texels along each axis of the values; of 256, the largest table takes 1 GiB
@@ -104,7 +106,11 @@ const MARGIN: usize = 4;
 /// Lengths that the sheet shows, in longest ones.
 const LENGTHS: [f64; 4] = [0.0625, 0.25, 0.5, 1.0];
 
-pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
+/// Builds the tables, and writes what is asked for of them.
+///
+/// # Errors
+/// Misuse of options, scenes that cannot be read, and files that cannot be written.
+pub fn run(options: &Options, threads: usize) -> Result<()> {
     for path in options.out.iter().chain(&options.tiles) {
         output::check_picture(path)?;
     }
@@ -115,7 +121,7 @@ pub(crate) fn run(options: &Options, threads: usize) -> Result<()> {
     let device = options.request.device(given.as_ref()).or_environment();
     let renderer = Renderer::with_device(threads, DeviceChoice::Cpu)?;
     renderer.install(|| {
-        let job = render::prepare(&options.request, given)?.of_mesh("tables")?;
+        let job = request::prepare(&options.request, given)?.of_mesh("tables")?;
         let points = job.tetrahedra.points(job.mesh.points());
         let geometry = TetMesh::unconnected(&points, &job.tetrahedra);
         let normal = [0, 1, 2, 3].map(|k| job.field.normal(k));

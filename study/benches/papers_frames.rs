@@ -168,7 +168,7 @@ fn tiles_against_volumes(mut renderer: Renderer) {
 /// Guthe et al. 2002, table 5.
 fn sorts_and_data(mut renderer: Renderer) {
     println!("Guthe et al. 2002, table 5: polynomials of degree 2, 1280 x 960, each frame from another side");
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/papers");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/papers");
     for (name, file, array, reported) in [
         (
             "Blunt Fin",

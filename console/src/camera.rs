@@ -5,10 +5,11 @@ use clap::Args;
 use glam::{DQuat, DVec3};
 use halite::view::{Camera, Projection};
 
+/// From where a picture is seen.
 #[derive(Args, Clone)]
 #[group(skip)]
 #[command(next_help_heading = "Camera")]
-pub(crate) struct Options {
+pub struct Options {
     /// Turn around the view-up axis, in degrees to the right
     #[arg(long, value_name = "DEGREES", value_parser = parse::finite, allow_hyphen_values = true)]
     azimuth: Option<f64>,
@@ -37,12 +38,12 @@ pub(crate) struct Options {
 
 impl Options {
     /// `camera`, with what the options change.
-    pub(crate) fn apply(&self, camera: Camera) -> Camera {
+    pub fn apply(&self, camera: Camera) -> Camera {
         self.zoomed(self.aimed(camera))
     }
 
     /// As [`Self::apply`], with the camera moved by `fill` before it is zoomed, if no option says where it is.
-    pub(crate) fn framed(&self, camera: Camera, fill: impl FnOnce(Camera) -> Camera) -> Camera {
+    pub fn framed(&self, camera: Camera, fill: impl FnOnce(Camera) -> Camera) -> Camera {
         let camera = self.aimed(camera);
         let placed = self.position.is_some() || self.focal_point.is_some();
         self.zoomed(if placed { camera } else { fill(camera) })
@@ -80,7 +81,7 @@ impl Options {
 }
 
 /// `camera`, so many `degrees` further around its view-up axis.
-pub(crate) fn turned(mut camera: Camera, degrees: f64) -> Camera {
+pub fn turned(mut camera: Camera, degrees: f64) -> Camera {
     if let Some(axis) = camera.view_up.try_normalize() {
         turn(&mut camera, axis, degrees);
     }

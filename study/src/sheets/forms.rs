@@ -1,8 +1,6 @@
 //! The forms of the integral in both engines: errors and times in one table.
 
 use super::{Options, Row, Variant, check, set, sheet};
-use crate::render::{self, Job};
-use crate::{output, progress};
 use anyhow::{Context, Result};
 use halite::gpu::DeviceChoice;
 use halite::image::{Backdrop, Image};
@@ -11,6 +9,8 @@ use halite::integral::table::Kind;
 use halite::project::{Fragments, ProjectionOptions};
 use halite::render::{Engine, Renderer, Stats};
 use halite::view::View;
+use halite_console::request::{self, Job};
+use halite_console::{output, progress};
 use serde_json::json;
 
 /// Planes of a cylinder, and texels along both axes of each.
@@ -66,7 +66,7 @@ pub(super) fn run(options: &Options, threads: usize) -> Result<()> {
     let size = options.request.studied(given.as_ref())?;
     let device = options.request.device(given.as_ref());
     let mut reference = Renderer::with_device(threads, DeviceChoice::Cpu)?;
-    let job = reference.install(|| render::prepare(&options.request, given)?.of_mesh("study"))?;
+    let job = reference.install(|| request::prepare(&options.request, given)?.of_mesh("study"))?;
     let (view, _) = job.scene.view()?;
     let truth = progress::during("judging", |p| {
         set(&mut reference, &job)?;

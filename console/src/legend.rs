@@ -12,15 +12,15 @@ use halite::transfer::{Axis, TransferFunction};
 
 /// What a legend tells.
 #[derive(Clone)]
-pub(crate) struct Legend {
+pub struct Legend {
     /// What the numbers are of.
-    pub(crate) title: String,
+    pub title: String,
     /// The scalars that the bar ranges over.
-    pub(crate) axis: Axis,
+    pub axis: Axis,
     /// Their colours, and opacities.
-    pub(crate) transfer: TransferFunction,
+    pub transfer: TransferFunction,
     /// Whether the scalars drive the opacity, too.
-    pub(crate) opacities: bool,
+    pub opacities: bool,
 }
 
 /// How much of what is behind the legend its panel hides.
@@ -31,7 +31,7 @@ const NUMBERS: f64 = 6.5;
 
 impl Legend {
     /// The legend of `field`, which `scalars` are; none if its colours are its own, or there is one at most.
-    pub(crate) fn new(scalars: &Scalars, field: &Field, transfer: &TransferFunction, log: bool) -> Option<Self> {
+    pub fn new(scalars: &Scalars, field: &Field, transfer: &TransferFunction, log: bool) -> Option<Self> {
         let (first, last) = (transfer.color().first()?.0, transfer.color().last()?.0);
         if field.kind() == Kind::Rgba || first >= last || !transfer.has_knots() {
             return None;
@@ -45,7 +45,7 @@ impl Legend {
     }
 
     /// Draws it at the right of `image`, whose `background` says whether it is light or dark.
-    pub(crate) fn draw(&self, image: &mut Image, background: [f32; 3]) {
+    pub fn draw(&self, image: &mut Image, background: [f32; 3]) {
         let [w, h] = image.size.map(|n| n as usize);
         // Letters of pictures of many pixels are made of several each.
         let scale = (h / 1000).max(1);
@@ -100,7 +100,7 @@ impl Legend {
 }
 
 /// Places on the bar, and the numbers there: round ones.
-pub(crate) fn numbers(axis: &Axis) -> Vec<(f64, String)> {
+pub fn numbers(axis: &Axis) -> Vec<(f64, String)> {
     let [lo, hi] = axis.range();
     if axis.is_logarithmic() {
         let decades = (hi / lo).log10();
@@ -150,14 +150,16 @@ fn plain(s: f64) -> String {
 }
 
 /// A picture that letters of several pixels are written on.
-pub(crate) struct Canvas<'a> {
-    pub(crate) image: &'a mut Image,
-    pub(crate) scale: usize,
+pub struct Canvas<'a> {
+    /// What is drawn into.
+    pub image: &'a mut Image,
+    /// Pixels of a dot of the font.
+    pub scale: usize,
 }
 
 impl Canvas<'_> {
     /// Covers what is between two corners with a colour, as opaque as `alpha`.
-    pub(crate) fn fill(&mut self, [left, top, right, bottom]: [usize; 4], color: [f32; 3], alpha: f32) {
+    pub fn fill(&mut self, [left, top, right, bottom]: [usize; 4], color: [f32; 3], alpha: f32) {
         let [w, h] = self.image.size.map(|n| n as usize);
         for y in top..bottom.min(h) {
             for p in &mut self.image.pixels[y * w..][left.min(w)..right.clamp(left.min(w), w)] {
@@ -168,7 +170,7 @@ impl Canvas<'_> {
     }
 
     /// Writes `text` below and right of a corner.
-    pub(crate) fn write(&mut self, font: &MonoFont, [x, y]: [usize; 2], text: &str, ink: [f32; 3]) {
+    pub fn write(&mut self, font: &MonoFont, [x, y]: [usize; 2], text: &str, ink: [f32; 3]) {
         let [r, g, b] = ink.map(|c| (c * 255.0) as u8);
         let style = MonoTextStyle::new(font, Rgb888::new(r, g, b));
         let at = [x, y].map(|n| (n / self.scale) as i32);

@@ -7,7 +7,7 @@ use serde::de::DeserializeOwned;
 
 /// What of the projection engine's variant somebody said.
 #[derive(Args, Clone)]
-pub(crate) struct Variant {
+pub struct Variant {
     /// Where a fragment's values come from: intersected, interpolated, or linear (wrong in perspective)
     #[arg(long, value_name = "FORM", value_parser = named::<Fragments>, help_heading = "Projection engine")]
     fragments: Option<Fragments>,
@@ -35,7 +35,7 @@ pub(crate) struct Variant {
 
 impl Variant {
     /// `projection`, with what was said in its place.
-    pub(crate) fn apply(&self, projection: ProjectionOptions) -> ProjectionOptions {
+    pub fn apply(&self, projection: ProjectionOptions) -> ProjectionOptions {
         ProjectionOptions {
             fragments: self.fragments.unwrap_or(projection.fragments),
             thickness: self.thickness.unwrap_or(projection.thickness),
@@ -48,7 +48,7 @@ impl Variant {
     }
 
     /// The names of the options that were given.
-    pub(crate) fn given(&self) -> Vec<&'static str> {
+    pub fn given(&self) -> Vec<&'static str> {
         let all = [
             ("--fragments", self.fragments.is_some()),
             ("--thickness", self.thickness.is_some()),
@@ -63,12 +63,12 @@ impl Variant {
 }
 
 /// A variant by the name that scenes know it by.
-pub(crate) fn named<T: DeserializeOwned>(text: &str) -> Result<T, String> {
+pub fn named<T: DeserializeOwned>(text: &str) -> Result<T, String> {
     read(&text.into())
 }
 
 /// `NxN` or `NxNxN`; the third is 0 in the first, which only polynomials are.
-pub(crate) fn table(text: &str) -> Result<[u32; 3], String> {
+pub fn table(text: &str) -> Result<[u32; 3], String> {
     let parts: Result<Vec<u32>, _> = text.split('x').map(str::parse).collect();
     match parts.as_deref() {
         Ok([a, b]) => Ok([*a, *b, 0]),

@@ -19,12 +19,12 @@ fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
 }
 
 /// `X,Y,Z`
-pub(crate) fn vector(text: &str) -> Result<DVec3, String> {
+pub fn vector(text: &str) -> Result<DVec3, String> {
     numbers(text).map(DVec3::from)
 }
 
 /// `X,Y,Z`, all above 0
-pub(crate) fn factors(text: &str) -> Result<DVec3, String> {
+pub fn factors(text: &str) -> Result<DVec3, String> {
     let factors = vector(text)?;
     if factors.cmple(DVec3::ZERO).any() {
         return Err("all three factors must be above 0".into());
@@ -36,39 +36,39 @@ pub(crate) fn factors(text: &str) -> Result<DVec3, String> {
 }
 
 /// A whole number from 0.
-pub(crate) fn count(text: &str) -> Result<usize, String> {
+pub fn count(text: &str) -> Result<usize, String> {
     text.trim().parse().map_err(|_| "it must be a whole number from 0".into())
 }
 
 /// A number of threads, 0 for one for each core.
-pub(crate) fn threads(text: &str) -> Result<usize, String> {
+pub fn threads(text: &str) -> Result<usize, String> {
     let threads = count(text)?;
     if threads <= MOST_THREADS { Ok(threads) } else { Err(format!("there are {MOST_THREADS} threads at most")) }
 }
 
 /// A text that is not empty.
-pub(crate) fn name(text: &str) -> Result<String, String> {
+pub fn name(text: &str) -> Result<String, String> {
     if text.trim().is_empty() { Err("the name is empty".into()) } else { Ok(text.into()) }
 }
 
 /// A number above 0.
-pub(crate) fn positive(text: &str) -> Result<f64, String> {
+pub fn positive(text: &str) -> Result<f64, String> {
     number(text).and_then(|n| if n > 0.0 { Ok(n) } else { Err("it must be above 0".into()) })
 }
 
 /// A factor above 0.
-pub(crate) fn gain(text: &str) -> Result<f32, String> {
+pub fn gain(text: &str) -> Result<f32, String> {
     let gain = positive(text)? as f32;
     if gain > 0.0 && gain.is_finite() { Ok(gain) } else { Err(format!("{text} is beyond 32 bits")) }
 }
 
 /// A number of 0 or more.
-pub(crate) fn not_negative(text: &str) -> Result<f64, String> {
+pub fn not_negative(text: &str) -> Result<f64, String> {
     number(text).and_then(|n| if n >= 0.0 { Ok(n) } else { Err("it must be 0 or more".into()) })
 }
 
 /// `AMBIENT,DIFFUSE,SPECULAR,POWER`, all at least 0
-pub(crate) fn shade(text: &str) -> Result<Shade, String> {
+pub fn shade(text: &str) -> Result<Shade, String> {
     let [ambient, diffuse, specular, power] = numbers(text)?;
     if [ambient, diffuse, specular, power].iter().any(|x| *x < 0.0) {
         return Err("the shares of ambient, diffuse and specular light and the power must be 0 or more".into());
@@ -77,26 +77,26 @@ pub(crate) fn shade(text: &str) -> Result<Shade, String> {
 }
 
 /// Any finite number.
-pub(crate) fn finite(text: &str) -> Result<f64, String> {
+pub fn finite(text: &str) -> Result<f64, String> {
     number(text)
 }
 
 /// `WxH`
-pub(crate) fn size(text: &str) -> Result<[u32; 2], String> {
+pub fn size(text: &str) -> Result<[u32; 2], String> {
     let parts = text.split_once(['x', 'X']).and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
     let size = parts.ok_or("the size is width x height in pixels, such as 1024x768")?;
     if size.contains(&0) { Err("it has no pixels".into()) } else { Ok(size) }
 }
 
 /// `LO:HI`
-pub(crate) fn range(text: &str) -> Result<[f64; 2], String> {
+pub fn range(text: &str) -> Result<[f64; 2], String> {
     let (lo, hi) = text.split_once(':').ok_or("a range is two numbers, such as 0:1")?;
     let range = [number(lo)?, number(hi)?];
     if range[0] < range[1] { Ok(range) } else { Err("the first number must be below the second".into()) }
 }
 
 /// `0`, `1`, … or `magnitude`
-pub(crate) fn component(text: &str) -> Result<Component, String> {
+pub fn component(text: &str) -> Result<Component, String> {
     match text {
         "magnitude" => Ok(Component::Magnitude),
         _ => text.parse().map(Component::Index).map_err(|_| "it must be an index from 0, or \"magnitude\"".into()),
@@ -104,7 +104,7 @@ pub(crate) fn component(text: &str) -> Result<Component, String> {
 }
 
 /// A step, from 0; a time, which has a point or an exponent; or `last`
-pub(crate) fn time(text: &str) -> Result<Time, String> {
+pub fn time(text: &str) -> Result<Time, String> {
     match (text, text.trim().parse()) {
         ("last", _) => Ok(Time::Last),
         (_, Ok(step)) => Ok(Time::Step(step)),
@@ -114,13 +114,15 @@ pub(crate) fn time(text: &str) -> Result<Time, String> {
 
 /// What an 8-bit picture shows behind the volume: a colour, or nothing.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Background {
+pub enum Background {
+    /// Transparency.
     None,
+    /// Red, green and blue, 0 to 1.
     Color([f64; 3]),
 }
 
 /// `R,G,B`, `black`, `white` or `none`
-pub(crate) fn background(text: &str) -> Result<Background, String> {
+pub fn background(text: &str) -> Result<Background, String> {
     Ok(match text {
         "none" => Background::None,
         "black" => Background::Color([0.0; 3]),
@@ -136,7 +138,7 @@ pub(crate) fn background(text: &str) -> Result<Background, String> {
 }
 
 /// `R,G,B` or `R,G,B,A`: a colour in 0 to 1, and an opacity
-pub(crate) fn color_and_opacity(text: &str) -> Result<([f64; 3], Option<f64>), String> {
+pub fn color_and_opacity(text: &str) -> Result<([f64; 3], Option<f64>), String> {
     let list = text.split(',').map(number).collect::<Result<Vec<_>, _>>()?;
     let (color, opacity) = match list[..] {
         [r, g, b] => ([r, g, b], None),
@@ -150,26 +152,26 @@ pub(crate) fn color_and_opacity(text: &str) -> Result<([f64; 3], Option<f64>), S
 }
 
 /// `X,Y,Z,NX,NY,NZ`
-pub(crate) fn plane(text: &str) -> Result<ClippingPlane, String> {
+pub fn plane(text: &str) -> Result<ClippingPlane, String> {
     let [x, y, z, a, b, c] = numbers(text)?;
     let (origin, normal) = (DVec3::new(x, y, z), DVec3::new(a, b, c));
     if normal == DVec3::ZERO { Err("the normal is zero".into()) } else { Ok(ClippingPlane { origin, normal }) }
 }
 
 /// `X0,X1,Y0,Y1,Z0,Z1`
-pub(crate) fn crop(text: &str) -> Result<[[f64; 2]; 3], String> {
+pub fn crop(text: &str) -> Result<[[f64; 2]; 3], String> {
     let [a, b, c, d, e, f] = numbers(text)?;
     Ok([[a, b], [c, d], [e, f]])
 }
 
 /// Cropping regions by their name, with hyphens for blanks, or by their bits, such as 0x2000.
-pub(crate) fn regions(text: &str) -> Result<u32, String> {
+pub fn regions(text: &str) -> Result<u32, String> {
     let bits = text.strip_prefix("0x").map_or_else(|| text.parse(), |hex| u32::from_str_radix(hex, 16));
     bits.or_else(|_| halite::scene::regions(&text.replace('-', " ")))
 }
 
 /// `S:A,S:A,…`
-pub(crate) fn opacity(text: &str) -> Result<Opacity, String> {
+pub fn opacity(text: &str) -> Result<Opacity, String> {
     let knot = |k: &str| {
         let (s, a) = k.split_once(':').ok_or("knots are scalar:opacity, such as 0:0,50%:0.2,1:1")?;
         let place = match s.strip_suffix('%') {
@@ -182,7 +184,7 @@ pub(crate) fn opacity(text: &str) -> Result<Opacity, String> {
 }
 
 /// Where samples are taken along rays.
-pub(crate) fn sampling(text: &str) -> Result<halite::cast::Sampling, String> {
+pub fn sampling(text: &str) -> Result<halite::cast::Sampling, String> {
     if text == "voxels" {
         return Ok(halite::cast::Sampling::Voxels);
     }

@@ -9,7 +9,7 @@ use halite::integral::table::Kind;
 
 /// What of the integral's form somebody said.
 #[derive(Args, Clone)]
-pub(crate) struct Integral {
+pub struct Integral {
     /// How a ray is integrated in a cell: auto, exact, or by a table: volume, polynomial or cylindrical; of a grid's slabs
     /// between samples, second-order (of one length) or second-order-polynomial; with a second variable or light adaptive,
     /// analytic, or segmented
@@ -62,7 +62,7 @@ fn by_name(name: &str) -> Result<String, String> {
 
 impl Integral {
     /// `choice`, with what was said in its place.
-    pub(crate) fn apply(&self, choice: IntegrationOptions) -> IntegrationOptions {
+    pub fn apply(&self, choice: IntegrationOptions) -> IntegrationOptions {
         let choice = self.integral.as_deref().and_then(|name| choice.named(name).ok()).unwrap_or(choice);
         IntegrationOptions {
             form: choice.form,
@@ -85,7 +85,7 @@ impl Integral {
     }
 
     /// The names of the options that were given and are not the table's size.
-    pub(crate) fn given(&self) -> Vec<&'static str> {
+    pub fn given(&self) -> Vec<&'static str> {
         let all = [
             ("--integral", self.integral.is_some()),
             ("--lengths", self.lengths.is_some()),
@@ -104,7 +104,7 @@ impl Integral {
     }
 
     /// Refuses a size that was given and that tables as `choice` says cannot have.
-    pub(crate) fn check(&self, choice: &IntegrationOptions) -> Result<()> {
+    pub fn check(&self, choice: &IntegrationOptions) -> Result<()> {
         match self.table {
             Some(_) => choice.check(choice.size(0)).map_err(|e| misuse(format!("--table: {e}"))),
             None => Ok(()),
