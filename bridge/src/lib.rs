@@ -138,12 +138,8 @@ mod bridge {
     struct IntegralSpec<'a> {
         form: &'a str,
         table: [i32; 3],
-        lengths: &'a str,
         texels: &'a str,
         degree: i32,
-        alpha: &'a str,
-        planes: &'a str,
-        iterations: i32,
         reconstruction: &'a str,
         sample_distance: f64,
     }
@@ -307,21 +303,10 @@ fn choice(spec: &IntegralSpec) -> Result<IntegrationOptions> {
     }
     choice.table = table(spec.table)?;
     choice.texels = named("kind of a table's texels", spec.texels)?;
-    if form == Form::Volume {
-        choice.lengths = named("kind of a table's lengths", spec.lengths)?;
-    }
-    if form == Form::Cylindrical {
-        choice.planes = named("kind of a cylinder's planes", spec.planes)?;
-    }
-    if form == Form::SecondOrder {
-        // What is no count is refused as 0 is.
-        choice.iterations = u32::try_from(spec.iterations).unwrap_or(0);
-    }
     if matches!(form, Form::Polynomial | Form::SecondOrderPolynomial | Form::Auto) {
         let degree = spec.degree;
         let negative = |_| Error::Render(format!("polynomials have a degree from 1 to 8, and not {degree}"));
         choice.degree = u32::try_from(degree).map_err(negative)?;
-        choice.alpha = named("kind of polynomials' alpha", spec.alpha)?;
     }
     Ok(choice)
 }

@@ -238,9 +238,8 @@ void Renderer::setTransferFunction(const TransferFunction& function)
 void Renderer::setIntegral(const Integral& i)
 {
   Inner::Run(this->Data, [&](bridge::Session& session) {
-    bridge::set_integral(session,
-      { str(i.form), i.table, str(i.lengths), str(i.texels), i.degree, str(i.alpha), str(i.planes), i.iterations,
-        str(i.reconstruction), i.sampleDistance });
+    bridge::set_integral(
+      session, { str(i.form), i.table, str(i.texels), i.degree, str(i.reconstruction), i.sampleDistance });
   });
 }
 

@@ -400,18 +400,10 @@ struct Integral
   /// volume; as many in front as behind in the others; a multiple of 4 planes; polynomials have as many layers as their
   /// degree wants. All 0: as many as suit the function. At most 1 GiB at 16 bytes each.
   std::array<std::int32_t, 3> table = { 0, 0, 0 };
-  /// Of a volume: "log-normalised", "log" or "uniform".
-  std::string lengths;
   /// "float", "unorm16" or "unorm8".
   std::string texels;
   /// Of polynomials: 1 to 8.
   std::int32_t degree = 2;
-  /// Of polynomials, how opacity depends on the length: "exponential" or "linear".
-  std::string alpha;
-  /// Of a cylinder, which are read: "two", "one", or "packed" (two, in less memory).
-  std::string planes;
-  /// Of "second-order": steps in which a slab is summed.
-  std::int32_t iterations = 64;
   /// Of regular and rectilinear grids, what stands for the field between samples along rays: "exact" (itself), "2" (parabolas),
   /// "1" (lines), or rectangles by the middle sample, "0", or the sample at either end, "0-left" and "0-right".
   std::string reconstruction;

@@ -176,11 +176,11 @@ int main(int argc, char** argv)
   EXPECT(has(failure([&] { second.setIntegral(integral); }), "8 x -8 x 8"));
   integral = { "volume", { 64, 64, -1 } };
   EXPECT(has(failure([&] { second.setIntegral(integral); }), "64 x 64 x -1"));
-  EXPECT(has(failure([] { halite::Renderer({ 1, "cpu", "", { "volume", {}, "long" } }); }), "log-normalised"));
+  EXPECT(has(failure([] { halite::Renderer({ 1, "cpu", "", { "volume", {}, "long" } }); }), "unorm16"));
   EXPECT(farthest(draw(second, slanted()), exact) == fourth);
   // What a form does not use is not read.
-  EXPECT(errorOf({ "exact", { 1, -1, 0 }, "long", "none", -3, "none", "three" }) == 0);
-  EXPECT(errorOf({ "cylindrical", { 64, 64, 16 }, "long", "float", -3, "none", "two" }) > 0);
+  EXPECT(errorOf({ "exact", { 1, -1, 0 }, "none", -3 }) == 0);
+  EXPECT(errorOf({ "cylindrical", { 64, 64, 16 }, "float", -3 }) > 0);
   EXPECT(errorOf({}) == 0);
 
   // Errors are exceptions that say what is wrong, and harm nothing.

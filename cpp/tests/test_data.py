@@ -277,8 +277,8 @@ def test_empty_grids_draw_nothing_and_are_no_error():
 
 def test_errors_leave_the_application_alive():
     cases = dict(array=lambda m: (m.SetScalarModeToUsePointFieldData(), m.SelectScalarArray("nowhere")),
-                 device=lambda m: m.SetDevice("no such thing"), engine=lambda m: m.SetEngine("magic"),
-                 integral=lambda m: m.SetIntegral("guess"))
+                 device=lambda m: m.SetDevice("no such thing"),
+                 integral=lambda m: (m.SetIntegralToVolume(), m.SetTableSize(1, 1, 1)))
     for name, spoil in cases.items():
         v = volume(lattice(2, field=SLANT), WAVES, RAMP)
         spoil(v.GetMapper())
@@ -286,8 +286,8 @@ def test_errors_leave_the_application_alive():
         w, r = scene(v)
         assert pixels(w).max() == 0 and pixels(w).max() == 0 and len(errors) == 1, name
         v.GetMapper().SetScalarModeToDefault()
-        for setting in ("Device", "Engine", "Integral"):
-            getattr(v.GetMapper(), "Set" + setting)("auto")
+        v.GetMapper().SetDevice("auto")
+        v.GetMapper().SetIntegralToAuto()
         check(pixels(w), truth(r, (64, 64), **BOX), what=name)
 
 
@@ -296,14 +296,14 @@ def test_projection_engine():
     for camera, unit in (dict(), 1.0), (dict(parallel=0.9), 0.5):
         v = volume(lattice(2, cells="hex", field=SLANT), WAVES, RAMP, unit)
         m = v.GetMapper()
-        m.SetEngine("project")
+        m.SetEngineToProject()
         errors = Errors(m)
         w, r = scene(v, **camera)
         picture = pixels(w)
         if len(errors):
             # There is no Vulkan driver here, not even one in software.
             assert "HALITE_REQUIRE_GPU" not in os.environ
-            m.SetEngine("auto")
+            m.SetEngineToAuto()
             assert pixels(w).max() > 0
             print("skipped: no device can project")
             return

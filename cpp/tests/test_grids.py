@@ -250,9 +250,10 @@ def test_reconstructions_by_tables():
     errors = messages(v.GetMapper())
     w, _ = scene(v, size=WINDOW, position=(2.4, -2.1, 3.0))
     exact, pictures = pixels(w), []
-    v.GetMapper().SetReconstruction("2")
-    for form, step in (("exact", 0), ("second-order-polynomial", 0), ("exact", 0.05), ("second-order", 0.05)):
-        v.GetMapper().SetIntegral(form)
+    m = v.GetMapper()
+    m.SetReconstructionToParabolas()
+    for form, step in ((m.EXACT, 0), (m.SECOND_ORDER_POLYNOMIAL, 0), (m.EXACT, 0.05), (m.SECOND_ORDER, 0.05)):
+        m.SetIntegral(form)
         v.GetMapper().SetSampleDistance(step)
         pictures.append(pixels(w))
     assert len(errors) == 0
@@ -262,7 +263,7 @@ def test_reconstructions_by_tables():
         check(plain, exact, near=8)
     # The table of one length ends before the last slab, which shows where rays are short.
     assert np.abs(pictures[3].astype(int) - pictures[2]).mean() < 3
-    v.GetMapper().SetIntegral("volume")
+    m.SetIntegralToVolume()
     pixels(w)
     assert len(errors) == 1 and "second-order" in errors[0]
 

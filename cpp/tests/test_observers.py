@@ -151,8 +151,8 @@ def edit_function(s):
 def settings(s):
     s.mapper.SetNumberOfThreads(2)
     s.mapper.SetDevice("cpu")
-    s.mapper.SetIntegral("polynomial")
-    s.mapper.SetIntegral("exact")
+    s.mapper.SetIntegralToPolynomial()
+    s.mapper.SetIntegralToExact()
 
 
 def ask(s):

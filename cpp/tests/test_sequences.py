@@ -110,11 +110,13 @@ class Program:
 
     def distance(self, k): self.mapper.SetImageSampleDistance(self.one((1, 2)))
 
-    def integral(self, k): self.mapper.SetIntegral(self.one(("exact", "exact", "no such", "auto")))
+    def integral(self, k):
+        """Some have a table that cannot be."""
+        m = self.mapper
+        m.SetIntegral(self.one((m.EXACT, m.EXACT, m.VOLUME, m.AUTO_INTEGRAL)))
+        m.SetTableSize((1, 1, 1) if m.GetIntegral() == m.VOLUME else (0, 0, 0))
 
-    def unused(self, k):
-        self.mapper.SetPolynomialDegree(self.one((2, 99)))
-        self.mapper.SetTableLengths(self.one(("log-normalised", "x")))
+    def unused(self, k): self.mapper.SetPolynomialDegree(self.one((2, 99)))
 
     def threads(self, k): self.mapper.SetNumberOfThreads(self.one((0, 1, 2)))
 
@@ -185,7 +187,7 @@ class Program:
         """What a mapper of its own draws of what the program has now."""
         m = vtkHaliteMapper()
         m.SetInputData(self.mapper.GetInput())
-        for name in ("Integral", "BlendMode", "ImageSampleDistance", "PolynomialDegree", "TableLengths"):
+        for name in ("Integral", "BlendMode", "ImageSampleDistance", "PolynomialDegree", "TableSize"):
             getattr(m, "Set" + name)(getattr(self.mapper, "Get" + name)())
         if self.mapper.GetClippingPlanes():
             m.SetClippingPlanes(self.mapper.GetClippingPlanes())

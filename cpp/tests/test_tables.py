@@ -4,6 +4,7 @@ import numpy as np
 from scene import *  # noqa: F403
 from test_pictures import RAMP, SLANT, WAVES
 UNIT = 0.15
+M = vtkHaliteMapper
 
 
 def table(**settings):
@@ -34,38 +35,22 @@ def errors_of(form, name, values, **settings):
 
 
 def test_higher_degrees_are_nearer_to_the_integral():
-    first, second, fourth = errors_of("polynomial", "PolynomialDegree", (1, 2, 4))
+    first, second, fourth = errors_of(M.POLYNOMIAL, "PolynomialDegree", (1, 2, 4))
     assert fourth < second < first and fourth < first / 2
 
 
 def test_more_texels_are_nearer_to_the_integral():
-    few, more = errors_of("volume", "TableSize", ((12, 12, 4), (256, 256, 32)))
+    few, more = errors_of(M.VOLUME, "TableSize", ((12, 12, 4), (256, 256, 32)))
     assert more < few / 2
-    few, more = errors_of("polynomial", "TableSize", ((12, 12, 0), (256, 256, 0)), PolynomialDegree=8)
+    few, more = errors_of(M.POLYNOMIAL, "TableSize", ((12, 12, 0), (256, 256, 0)), PolynomialDegree=8)
     assert more < few / 2
-    few, more = errors_of("cylindrical", "TableSize", ((16, 16, 16), (128, 128, 128)))
+    few, more = errors_of(M.CYLINDRICAL, "TableSize", ((16, 16, 16), (128, 128, 128)))
     assert more < few / 2
-
-
-def test_lengths_of_volumes():
-    uniform, logarithmic, normalised = errors_of(
-        "volume", "TableLengths", ("uniform", "log", "log-normalised"), TableSize=(256, 256, 6))
-    assert normalised < min(uniform, logarithmic)
 
 
 def test_finer_texels_are_nearer_to_the_integral():
-    eight, full = errors_of("volume", "TableTexels", ("unorm8", "float"), TableSize=(256, 256, 64))
+    eight, full = errors_of(M.VOLUME, "TableTexels", (M.UNORM8, M.FLOAT32), TableSize=(256, 256, 64))
     assert full < eight
-
-
-def test_alpha_of_polynomials():
-    linear, exponential = errors_of("polynomial", "PolynomialAlpha", ("linear", "exponential"))
-    assert exponential < linear / 2
-
-
-def test_planes_of_cylinders():
-    one, two = errors_of("cylindrical", "CylinderPlanes", ("one", "two"), TableSize=(64, 64, 16))
-    assert two < one
 
 
 def test_bad_settings_are_one_error_and_can_be_mended():
@@ -75,16 +60,11 @@ def test_bad_settings_are_one_error_and_can_be_mended():
     said = messages(m)
     # What is said names what there is.
     cases = [
-        (dict(Integral="guess"), "polynomial"),
-        (dict(Integral="polynomial", PolynomialDegree=9), "from 1 to 8, and not 9"),
-        (dict(Integral="auto", PolynomialDegree=-3), "from 1 to 8, and not -3"),
-        (dict(Integral="volume", TableLengths="short"), "log-normalised"),
-        (dict(Integral="cylindrical", TableTexels="double"), "unorm16"),
-        (dict(Integral="polynomial", PolynomialAlpha="none"), "exponential"),
-        (dict(Integral="cylindrical", CylinderPlanes="three"), "packed"),
-        (dict(Integral="polynomial", TableSize=(8, -8, 8)), "8 x -8 x 8"),
-        (dict(Integral="volume", TableSize=(1, 8, 8)), "at least 2, 2 and 3"),
-        (dict(Integral="cylindrical", TableSize=(8, 8, 6)), "multiple of 4"),
+        (dict(Integral=M.POLYNOMIAL, PolynomialDegree=9), "from 1 to 8, and not 9"),
+        (dict(Integral=M.AUTO_INTEGRAL, PolynomialDegree=-3), "from 1 to 8, and not -3"),
+        (dict(Integral=M.POLYNOMIAL, TableSize=(8, -8, 8)), "8 x -8 x 8"),
+        (dict(Integral=M.VOLUME, TableSize=(1, 8, 8)), "at least 2, 2 and 3"),
+        (dict(Integral=M.CYLINDRICAL, TableSize=(8, 8, 6)), "multiple of 4"),
     ]
     for settings, word in cases:
         good = {name: getattr(m, "Get" + name)() for name in settings}
@@ -99,14 +79,14 @@ def test_bad_settings_are_one_error_and_can_be_mended():
 
 
 def test_pairs_are_read_from_weights_of_their_colours():
-    v, w, r = table(Integral="polynomial", PolynomialDegree=4)
+    v, w, r = table(Integral=M.POLYNOMIAL, PolynomialDegree=4)
     m = v.GetMapper()
     expected = truth(r, (64, 64), field=SLANT, opacity=WAVES, color=RAMP, unit=UNIT)
     said = messages(m)
     # Both components are the field.
     m.SetInputData(lattice(1, field=lambda p: np.stack([SLANT(p), SLANT(p)], -1)))
     v.GetProperty().IndependentComponentsOff()
-    for form in ("polynomial", "volume"):
+    for form in (M.POLYNOMIAL, M.VOLUME):
         m.SetIntegral(form)
         off = apart(w, expected)
         print(f"        {form}: {off:.3f}")
@@ -116,9 +96,8 @@ def test_pairs_are_read_from_weights_of_their_colours():
 def test_setters_tell_changes_only():
     m = vtkHaliteMapper()
     # Those by default, in the end.
-    cases = dict(Integral=("auto", "exact"), TableSize=((8, 8, 8), (0, 0, 0)), TableLengths=("log", "log-normalised"),
-                 TableTexels=("unorm8", "float"), PolynomialDegree=(4, 2), PolynomialAlpha=("linear", "exponential"),
-                 CylinderPlanes=("packed", "two"))
+    cases = dict(Integral=(M.AUTO_INTEGRAL, M.EXACT), TableSize=((8, 8, 8), (0, 0, 0)), TableTexels=(M.UNORM8, M.FLOAT32),
+                 PolynomialDegree=(4, 2), Engine=(M.PROJECT, M.AUTO_ENGINE), Reconstruction=(M.PARABOLAS, M.TRILINEAR))
     for name, values in cases.items():
         ask, tell = getattr(m, "Get" + name), getattr(m, "Set" + name)
         assert ask() == values[-1], name
@@ -128,8 +107,33 @@ def test_setters_tell_changes_only():
             changed = m.GetMTime()
             tell(value)
             assert changed > before and m.GetMTime() == changed and ask() == value, (name, value)
-            shown = " ".join(map(str, value)) if isinstance(value, tuple) else value
+            as_string = getattr(m, f"Get{name}AsString", lambda: " ".join(map(str, value if isinstance(value, tuple) else (value,))))
+            shown = as_string()
             assert f"{name}: {shown}\n" in str(m), name
+
+
+def test_enumerations_have_setters_and_the_names_of_scene_files():
+    names = dict(Engine=["auto", "traverse", "project"],
+                 Integral=["exact", "auto", "volume", "polynomial", "cylindrical", "second-order", "second-order-polynomial"],
+                 TableTexels=["float", "unorm16", "unorm8"], OpacityConvention=["Extinction", "Opacity", "ByInput"],
+                 Reconstruction=["exact", "2", "1", "0", "0-left", "0-right"])
+    m = M()
+    for name, strings in names.items():
+        ask, tell = getattr(m, f"Get{name}AsString"), getattr(m, "Set" + name)
+        for value, string in enumerate(strings):
+            tell(value)
+            assert ask() == string and f"{name}: {string}\n" in str(m), (name, value, ask())
+        # What is beyond is the nearest.
+        for value, string in ((-1, strings[0]), (len(strings), strings[-1])):
+            tell(value)
+            assert ask() == string, (name, value)
+        setters = {s for s in dir(m) if s.startswith(f"Set{name}To")}
+        assert len(setters) == len(strings), setters
+        said = set()
+        for setter in setters:
+            getattr(m, setter)()
+            said.add(ask())
+        assert said == set(strings), (name, said)
 
 
 if __name__ == "__main__":

@@ -34,8 +34,7 @@ Content::Content(const halite::Settings& settings, vtkDataSet* grid, vtkDataArra
 {
   this->SettingsKey << settings.device << settings.engine << static_cast<std::uint64_t>(settings.threads);
   const halite::Integral& integral = settings.integral;
-  this->IntegralKey << integral.form << integral.lengths << integral.texels << integral.alpha << integral.planes
-                    << static_cast<double>(integral.degree) << static_cast<double>(integral.iterations)
+  this->IntegralKey << integral.form << integral.texels << static_cast<double>(integral.degree)
                     << integral.reconstruction << integral.sampleDistance;
   for (int n : integral.table)
   {

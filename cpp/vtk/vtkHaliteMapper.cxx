@@ -47,25 +47,11 @@ vtkHaliteMapper::vtkHaliteMapper()
   : Inner(new Internals(*this))
 {
   this->SetDevice("auto");
-  this->SetEngine("auto");
-  this->SetIntegral("exact");
-  this->SetTableLengths("log-normalised");
-  this->SetTableTexels("float");
-  this->SetPolynomialAlpha("exponential");
-  this->SetCylinderPlanes("two");
-  this->SetReconstruction("exact");
 }
 
 vtkHaliteMapper::~vtkHaliteMapper()
 {
   this->SetDevice(nullptr);
-  this->SetEngine(nullptr);
-  this->SetIntegral(nullptr);
-  this->SetTableLengths(nullptr);
-  this->SetTableTexels(nullptr);
-  this->SetPolynomialAlpha(nullptr);
-  this->SetCylinderPlanes(nullptr);
-  this->SetReconstruction(nullptr);
   this->SetTransfer2DYAxisArray(nullptr);
 }
 
@@ -349,29 +335,56 @@ vtkIdType vtkHaliteMapper::GetNumberOfTetrahedra()
   return static_cast<vtkIdType>(this->Inner->Cores.GetStatistics().tetrahedra);
 }
 
+// The names of scene files and of halite.h.
+const char* vtkHaliteMapper::GetEngineAsString()
+{
+  static const char* const names[] = { "auto", "traverse", "project" };
+  return names[this->Engine];
+}
+
+const char* vtkHaliteMapper::GetIntegralAsString()
+{
+  static const char* const names[] = { "exact", "auto", "volume", "polynomial", "cylindrical", "second-order",
+    "second-order-polynomial" };
+  return names[this->Integral];
+}
+
+const char* vtkHaliteMapper::GetTableTexelsAsString()
+{
+  static const char* const names[] = { "float", "unorm16", "unorm8" };
+  return names[this->TableTexels];
+}
+
+const char* vtkHaliteMapper::GetOpacityConventionAsString()
+{
+  static const char* const names[] = { "Extinction", "Opacity", "ByInput" };
+  return names[this->OpacityConvention];
+}
+
+const char* vtkHaliteMapper::GetReconstructionAsString()
+{
+  static const char* const names[] = { "exact", "2", "1", "0", "0-left", "0-right" };
+  return names[this->Reconstruction];
+}
+
 void vtkHaliteMapper::PrintSelf(ostream& os, vtkIndent indent)
 {
   this->Superclass::PrintSelf(os, indent);
   os << indent << "Device: " << Internals::Text(this->Device) << "\n";
-  os << indent << "Engine: " << Internals::Text(this->Engine) << "\n";
-  os << indent << "Integral: " << Internals::Text(this->Integral) << "\n";
+  os << indent << "Engine: " << this->GetEngineAsString() << "\n";
+  os << indent << "Integral: " << this->GetIntegralAsString() << "\n";
   os << indent << "TableSize: " << this->TableSize[0] << " " << this->TableSize[1] << " " << this->TableSize[2] << "\n";
-  os << indent << "TableLengths: " << Internals::Text(this->TableLengths) << "\n";
-  os << indent << "TableTexels: " << Internals::Text(this->TableTexels) << "\n";
+  os << indent << "TableTexels: " << this->GetTableTexelsAsString() << "\n";
   os << indent << "PolynomialDegree: " << this->PolynomialDegree << "\n";
-  os << indent << "PolynomialAlpha: " << Internals::Text(this->PolynomialAlpha) << "\n";
-  os << indent << "CylinderPlanes: " << Internals::Text(this->CylinderPlanes) << "\n";
-  static const char* const conventions[] = { "Extinction", "Opacity", "ByInput" };
-  os << indent << "OpacityConvention: " << conventions[this->OpacityConvention] << "\n";
+  os << indent << "OpacityConvention: " << this->GetOpacityConventionAsString() << "\n";
   os << indent << "Transfer2DYAxisArray: " << Internals::Text(this->Transfer2DYAxisArray) << "\n";
   os << indent << "SilhouettePower: " << this->SilhouettePower << "\n";
   for (const std::string& widget : this->Widgets)
   {
     os << indent << "Widget: " << widget << "\n";
   }
-  os << indent << "Reconstruction: " << Internals::Text(this->Reconstruction) << "\n";
+  os << indent << "Reconstruction: " << this->GetReconstructionAsString() << "\n";
   os << indent << "SampleDistance: " << this->SampleDistance << "\n";
-  os << indent << "TableIterations: " << this->TableIterations << "\n";
   os << indent << "Cropping: " << (this->Cropping ? "On" : "Off") << "\n";
   os << indent << "CroppingRegionPlanes:";
   for (double plane : this->CroppingRegionPlanes)

@@ -79,26 +79,58 @@ public:
   vtkGetStringMacro(Device);
   ///@}
 
-  ///@{
-  /**
-   * How: "auto" (the default), which is "project" on the CPU and "traverse" on a device for graphics; "traverse", by rays that walk
-   * from cell to cell; or "project", which projects cells. On the CPU their order is verified in every pixel, so pictures are those of
-   * the walk. On a device they are put in an order that is right for every pixel, unless cells overlap.
-   */
-  vtkSetStringMacro(Engine);
-  vtkGetStringMacro(Engine);
-  ///@}
+  enum Engines
+  {
+    AUTO_ENGINE,
+    TRAVERSE,
+    PROJECT
+  };
 
   ///@{
   /**
-   * The form of the ray integral: "exact" (the default); a pre-integrated table, "volume", "polynomial" or "cylindrical" (and for a
-   * Reconstruction by parabolas "second-order" or "second-order-polynomial"); or
-   * "auto": exact, or a table where a function has so many points that it is faster. On images and rectilinear grids tables are for
-   * arrays of which one component or the magnitude is drawn. After an edit of the volume's property frames are exact until the
-   * table is built anew, which happens meanwhile; after a change of this or of what follows, the next frame waits for it.
+   * How: AUTO_ENGINE (the default), which is PROJECT on the CPU and TRAVERSE on a device for graphics; TRAVERSE, by rays that walk
+   * from cell to cell; or PROJECT, which projects cells. On the CPU their order is verified in every pixel, so pictures are those of
+   * the walk. On a device they are put in an order that is right for every pixel, unless cells overlap. As a string it has the name
+   * that scene files and the program know it by, "auto", "traverse" or "project".
    */
-  vtkSetStringMacro(Integral);
-  vtkGetStringMacro(Integral);
+  vtkSetClampMacro(Engine, int, AUTO_ENGINE, PROJECT);
+  vtkGetMacro(Engine, int);
+  void SetEngineToAuto() { this->SetEngine(AUTO_ENGINE); }
+  void SetEngineToTraverse() { this->SetEngine(TRAVERSE); }
+  void SetEngineToProject() { this->SetEngine(PROJECT); }
+  const char* GetEngineAsString();
+  ///@}
+
+  enum Integrals
+  {
+    EXACT,
+    AUTO_INTEGRAL,
+    VOLUME,
+    POLYNOMIAL,
+    CYLINDRICAL,
+    SECOND_ORDER,
+    SECOND_ORDER_POLYNOMIAL
+  };
+
+  ///@{
+  /**
+   * The form of the ray integral: EXACT (the default); a pre-integrated table, VOLUME, POLYNOMIAL or CYLINDRICAL (and for a
+   * Reconstruction by PARABOLAS SECOND_ORDER, of one length, or SECOND_ORDER_POLYNOMIAL, of all); or
+   * AUTO_INTEGRAL: exact, or a table where a function has so many points that it is faster. On images and rectilinear grids tables are
+   * for arrays of which one component or the magnitude is drawn. After an edit of the volume's property frames are exact until the
+   * table is built anew, which happens meanwhile; after a change of this or of what follows, the next frame waits for it. As a string:
+   * "exact", "auto", "volume", "polynomial", "cylindrical", "second-order" or "second-order-polynomial".
+   */
+  vtkSetClampMacro(Integral, int, EXACT, SECOND_ORDER_POLYNOMIAL);
+  vtkGetMacro(Integral, int);
+  void SetIntegralToExact() { this->SetIntegral(EXACT); }
+  void SetIntegralToAuto() { this->SetIntegral(AUTO_INTEGRAL); }
+  void SetIntegralToVolume() { this->SetIntegral(VOLUME); }
+  void SetIntegralToPolynomial() { this->SetIntegral(POLYNOMIAL); }
+  void SetIntegralToCylindrical() { this->SetIntegral(CYLINDRICAL); }
+  void SetIntegralToSecondOrder() { this->SetIntegral(SECOND_ORDER); }
+  void SetIntegralToSecondOrderPolynomial() { this->SetIntegral(SECOND_ORDER_POLYNOMIAL); }
+  const char* GetIntegralAsString();
   ///@}
 
   ///@{
@@ -112,20 +144,24 @@ public:
   vtkGetVector3Macro(TableSize, int);
   ///@}
 
-  ///@{
-  /**
-   * The lengths of a volume: "log-normalised" (the default), "log" or "uniform".
-   */
-  vtkSetStringMacro(TableLengths);
-  vtkGetStringMacro(TableLengths);
-  ///@}
+  enum Texels
+  {
+    FLOAT32,
+    UNORM16,
+    UNORM8
+  };
 
   ///@{
   /**
-   * What the table's texels are: "float" (32 bits, the default), "unorm16" or "unorm8".
+   * What the table's texels are: FLOAT32 (32-bit floats, the default), or UNORM16 or UNORM8, 16 or 8 bits of the range that there is.
+   * As a string: "float", "unorm16" or "unorm8".
    */
-  vtkSetStringMacro(TableTexels);
-  vtkGetStringMacro(TableTexels);
+  vtkSetClampMacro(TableTexels, int, FLOAT32, UNORM8);
+  vtkGetMacro(TableTexels, int);
+  void SetTableTexelsToFloat32() { this->SetTableTexels(FLOAT32); }
+  void SetTableTexelsToUnorm16() { this->SetTableTexels(UNORM16); }
+  void SetTableTexelsToUnorm8() { this->SetTableTexels(UNORM8); }
+  const char* GetTableTexelsAsString();
   ///@}
 
   ///@{
@@ -134,22 +170,6 @@ public:
    */
   vtkSetMacro(PolynomialDegree, int);
   vtkGetMacro(PolynomialDegree, int);
-  ///@}
-
-  ///@{
-  /**
-   * How the opacity of polynomials depends on the length: "exponential" (as it does; the default), or "linear".
-   */
-  vtkSetStringMacro(PolynomialAlpha);
-  vtkGetStringMacro(PolynomialAlpha);
-  ///@}
-
-  ///@{
-  /**
-   * Which planes of a cylinder are read: the "two" nearest (the default), "one", or "packed", two that are stored in less memory.
-   */
-  vtkSetStringMacro(CylinderPlanes);
-  vtkGetStringMacro(CylinderPlanes);
   ///@}
 
   enum OpacityConventions
@@ -170,6 +190,7 @@ public:
   void SetOpacityConventionToExtinction() { this->SetOpacityConvention(EXTINCTION); }
   void SetOpacityConventionToOpacity() { this->SetOpacityConvention(OPACITY); }
   void SetOpacityConventionToByInput() { this->SetOpacityConvention(BY_INPUT); }
+  const char* GetOpacityConventionAsString();
   ///@}
 
   ///@{
@@ -201,14 +222,31 @@ public:
   vtkGetMacro(SilhouettePower, double);
   ///@}
 
+  enum Reconstructions
+  {
+    TRILINEAR,
+    PARABOLAS,
+    LINES,
+    MIDDLE_SAMPLES,
+    LEFT_SAMPLES,
+    RIGHT_SAMPLES
+  };
+
   ///@{
   /**
-   * Of regular and rectilinear grids, what stands for the field between samples along rays: "exact" (itself, the default), "2"
-   * (parabolas, for which there are the tables "second-order", of one length, and "second-order-polynomial", of all), "1" (lines),
-   * "0", "0-left" or "0-right" (rectangles).
+   * Of regular and rectilinear grids, what stands for the field between samples along rays: TRILINEAR (the field itself, which takes
+   * no samples; the default), PARABOLAS, LINES, or rectangles as high as the sample in the middle, on the left or on the right. As a
+   * string: "exact", "2", "1", "0", "0-left" or "0-right".
    */
-  vtkSetStringMacro(Reconstruction);
-  vtkGetStringMacro(Reconstruction);
+  vtkSetClampMacro(Reconstruction, int, TRILINEAR, RIGHT_SAMPLES);
+  vtkGetMacro(Reconstruction, int);
+  void SetReconstructionToTrilinear() { this->SetReconstruction(TRILINEAR); }
+  void SetReconstructionToParabolas() { this->SetReconstruction(PARABOLAS); }
+  void SetReconstructionToLines() { this->SetReconstruction(LINES); }
+  void SetReconstructionToMiddleSamples() { this->SetReconstruction(MIDDLE_SAMPLES); }
+  void SetReconstructionToLeftSamples() { this->SetReconstruction(LEFT_SAMPLES); }
+  void SetReconstructionToRightSamples() { this->SetReconstruction(RIGHT_SAMPLES); }
+  const char* GetReconstructionAsString();
   ///@}
 
   ///@{
@@ -217,14 +255,6 @@ public:
    */
   vtkSetClampMacro(SampleDistance, double, 0.0, VTK_DOUBLE_MAX);
   vtkGetMacro(SampleDistance, double);
-  ///@}
-
-  ///@{
-  /**
-   * Steps in which the slabs of "second-order" are summed; 64 by default.
-   */
-  vtkSetClampMacro(TableIterations, int, 1, 65536);
-  vtkGetMacro(TableIterations, int);
   ///@}
 
   ///@{
@@ -348,21 +378,17 @@ protected:
   ~vtkHaliteMapper() override;
 
   char* Device = nullptr;
-  char* Engine = nullptr;
-  char* Integral = nullptr;
+  int Engine = AUTO_ENGINE;
+  int Integral = EXACT;
   int TableSize[3] = { 0, 0, 0 };
-  char* TableLengths = nullptr;
-  char* TableTexels = nullptr;
+  int TableTexels = FLOAT32;
   int PolynomialDegree = 2;
-  char* PolynomialAlpha = nullptr;
-  char* CylinderPlanes = nullptr;
   int OpacityConvention = BY_INPUT;
   char* Transfer2DYAxisArray = nullptr;
   std::vector<std::string> Widgets;
   double SilhouettePower = -1;
-  char* Reconstruction = nullptr;
+  int Reconstruction = TRILINEAR;
   double SampleDistance = 0;
-  int TableIterations = 64;
   vtkTypeBool Cropping = 0;
   double CroppingRegionPlanes[6] = { 0, 1, 0, 1, 0, 1 };
   int CroppingRegionFlags = 0x0002000;

@@ -181,17 +181,13 @@ std::vector<Content> vtkHaliteMapper::Internals::Choose(
   halite::Settings settings;
   settings.threads = Threads::Of(this->Self.NumberOfThreads);
   settings.device = Text(this->Self.Device);
-  settings.engine = Text(this->Self.Engine);
+  settings.engine = this->Self.GetEngineAsString();
   halite::Integral& integral = settings.integral;
-  integral.form = Text(this->Self.Integral);
+  integral.form = this->Self.GetIntegralAsString();
   std::copy_n(this->Self.TableSize, 3, integral.table.begin());
-  integral.lengths = Text(this->Self.TableLengths);
-  integral.texels = Text(this->Self.TableTexels);
+  integral.texels = this->Self.GetTableTexelsAsString();
   integral.degree = this->Self.PolynomialDegree;
-  integral.alpha = Text(this->Self.PolynomialAlpha);
-  integral.planes = Text(this->Self.CylinderPlanes);
-  integral.iterations = this->Self.TableIterations;
-  integral.reconstruction = Text(this->Self.Reconstruction);
+  integral.reconstruction = this->Self.GetReconstructionAsString();
   integral.sampleDistance = this->Self.SampleDistance;
   const bool areSeveral = blocks.size() > 1;
   if (areSeveral)
