@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 /// Which variant of the engine draws. The default is the most accurate.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
+#[non_exhaustive]
 pub struct ProjectionOptions {
     /// Where the values and lengths of a fragment come from.
     pub fragments: Fragments,
@@ -40,6 +41,50 @@ impl ProjectionOptions {
     /// Whether anything is rounded at random.
     pub(crate) fn dithers(&self) -> bool {
         self.dither && self.target == Target::Rgba8
+    }
+}
+
+impl ProjectionOptions {
+    /// The same with another [`ProjectionOptions::fragments`].
+    #[must_use]
+    pub fn with_fragments(self, fragments: Fragments) -> Self {
+        ProjectionOptions { fragments, ..self }
+    }
+
+    /// The same with another [`ProjectionOptions::thickness`].
+    #[must_use]
+    pub fn with_thickness(self, thickness: Thickness) -> Self {
+        ProjectionOptions { thickness, ..self }
+    }
+
+    /// The same with another [`ProjectionOptions::order`].
+    #[must_use]
+    pub fn with_order(self, order: Order) -> Self {
+        ProjectionOptions { order, ..self }
+    }
+
+    /// The same with another [`ProjectionOptions::cycles`].
+    #[must_use]
+    pub fn with_cycles(self, cycles: Cycles) -> Self {
+        ProjectionOptions { cycles, ..self }
+    }
+
+    /// The same with another [`ProjectionOptions::target`].
+    #[must_use]
+    pub fn with_target(self, target: Target) -> Self {
+        ProjectionOptions { target, ..self }
+    }
+
+    /// The same with another [`ProjectionOptions::dither`].
+    #[must_use]
+    pub fn with_dither(self, dither: bool) -> Self {
+        ProjectionOptions { dither, ..self }
+    }
+
+    /// The same with another [`ProjectionOptions::compositing`].
+    #[must_use]
+    pub fn with_compositing(self, compositing: Compositing) -> Self {
+        ProjectionOptions { compositing, ..self }
     }
 }
 

@@ -221,8 +221,8 @@ fn errors<const N: usize>((scene, view): &(Scene, View), variants: [ProjectionOp
 
 #[test]
 fn perspective_interpolation_cures_linear() {
-    let form = |fragments| ProjectionOptions { fragments, ..ProjectionOptions::default() };
-    let by_depth = ProjectionOptions { thickness: Thickness::Depth, ..form(INTERPOLATED) };
+    let form = |fragments| ProjectionOptions::default().with_fragments(fragments);
+    let by_depth = form(INTERPOLATED).with_thickness(Thickness::Depth);
     let variants = [form(Fragments::Linear), by_depth, form(INTERPOLATED), form(Fragments::Intersected)];
     let Some([linear, by_depth, interpolated, intersected]) = errors(&peak(), variants) else { return };
     eprintln!(
@@ -244,7 +244,7 @@ fn table_errors<const N: usize>((scene, view): &(Scene, View), volumes: [Integra
 }
 
 fn volume(lengths: Kind, texels: Texels, table: [u32; 3]) -> IntegrationOptions {
-    IntegrationOptions { lengths, texels, table: Some(table), ..IntegrationOptions::of(Form::Volume) }
+    IntegrationOptions::of(Form::Volume).with_lengths(lengths).with_texels(texels).with_table(Some(table))
 }
 
 #[test]
@@ -276,20 +276,16 @@ fn floats_and_dithering_cure_8_bits() {
     let (scene, view) = faint();
     set(&mut renderer, &scene);
     let expected = Engine::Reference.image(&scene, &view);
-    let eight = ProjectionOptions { target: Target::Rgba8, ..ProjectionOptions::default() };
-    let variants = [
-        eight,
-        ProjectionOptions { dither: true, ..eight },
-        ProjectionOptions { target: Target::Rgba16float, ..eight },
-        ProjectionOptions::default(),
-    ];
+    let eight = ProjectionOptions::default().with_target(Target::Rgba8);
+    let variants =
+        [eight, eight.with_dither(true), eight.with_target(Target::Rgba16float), ProjectionOptions::default()];
     let [plain, dithered, half, float] =
         variants.map(|s| rmse(&blurred(&image(&mut renderer, s, &view)), &blurred(&expected)));
     eprintln!("8 bits {plain:.1e}, dithered {dithered:.1e}, 16-bit floats {half:.1e}, floats {float:.1e}");
     assert!(plain > 3.0 * dithered && plain > 10.0 * half && half > 5.0 * float && float < 1e-5);
     // Cells that only add up dither their colours.
-    let additive = |s| ProjectionOptions { compositing: Compositing::Additive, ..s };
-    let [sum, plain, dithered] = [ProjectionOptions::default(), eight, ProjectionOptions { dither: true, ..eight }]
+    let additive = |s: ProjectionOptions| s.with_compositing(Compositing::Additive);
+    let [sum, plain, dithered] = [ProjectionOptions::default(), eight, eight.with_dither(true)]
         .map(|s| blurred(&colours(image(&mut renderer, additive(s), &view))));
     let [plain, dithered] = [plain, dithered].map(|i| rmse(&i, &sum));
     eprintln!("additive: 8 bits {plain:.1e}, dithered {dithered:.1e}");
@@ -318,7 +314,7 @@ fn blurred(image: &Image) -> Image {
 
 #[test]
 fn orders_cure_one_another() {
-    let order = |order| ProjectionOptions { order, ..ProjectionOptions::default() };
+    let order = |order| ProjectionOptions::default().with_order(order);
     let variants = [Order::None, Order::MpvoConvex, Order::Mpvonc, Order::Depth, Order::Xmpvo, Order::Mpvo].map(order);
     let Some([none, convex, nonconvex, depth, xmpvo, mpvo]) = errors(&holes(), variants) else { return };
     eprintln!(
@@ -341,7 +337,7 @@ fn circles_are_left_to_the_walk() {
     let view = perspective(dvec3(0.01, 0.02, 4.0), 35.0);
     let expected = Engine::Reference.image(&scene, &view);
     let [cut, walked] = [Cycles::Cut, Cycles::Walk].map(|cycles| {
-        let max = image(&mut renderer, ProjectionOptions { cycles, ..ProjectionOptions::default() }, &view)
+        let max = image(&mut renderer, ProjectionOptions::default().with_cycles(cycles), &view)
             .compare(&expected)
             .unwrap()
             .max;
@@ -423,7 +419,7 @@ fn cells_that_hold_the_eye_are_clipped_not_dropped() {
     });
     for (at, bound) in [(dvec3(0.13, 0.21, 0.33), 1e-3), (dvec3(-0.4, 0.33, 0.9), 1e-3)] {
         let view = perspective(at, 100.0);
-        let form = |fragments| ProjectionOptions { fragments, ..ProjectionOptions::default() };
+        let form = |fragments| ProjectionOptions::default().with_fragments(fragments);
         let Some([interpolated, intersected]) =
             errors(&(scene.clone(), view), [form(INTERPOLATED), form(Fragments::Intersected)])
         else {
@@ -463,7 +459,7 @@ fn parts_of_a_cell_are_drawn_from_back_to_front() {
         let view = if i % 3 == 0 { view.with_clipping_range([0.15, 10.0]).unwrap() } else { view };
         let expected = Engine::Reference.image(&scene, &view);
         set(&mut renderer, &scene);
-        let options = ProjectionOptions { fragments: INTERPOLATED, ..ProjectionOptions::default() };
+        let options = ProjectionOptions::default().with_fragments(INTERPOLATED);
         report.hold(&format!("cell {i}"), &image(&mut renderer, options, &view), &expected, 2e-3);
     }
     report.finish("parts of a cell");
@@ -485,7 +481,7 @@ fn parallel_views_with_a_clipping_range_draw_cells_once() {
     let part = all.clone().with_clipping_range([3.0, 5.4]).unwrap();
     let expected = Engine::Reference.image(&scene, &part);
     for fragments in [INTERPOLATED, Fragments::Linear, Fragments::Intersected] {
-        let options = ProjectionOptions { fragments, ..ProjectionOptions::default() };
+        let options = ProjectionOptions::default().with_fragments(fragments);
         image(&mut renderer, options, &all);
         let whole = renderer.stats().projection.unwrap().drawn_cells;
         let error = image(&mut renderer, options, &part).compare(&expected).unwrap();

@@ -70,20 +70,15 @@ fn draw(renderer: &mut Renderer, order: Order, sampling: Sampling, choice: Integ
 /// Every form with the reconstructions that read it, and how far its pictures may be from those of the integral.
 fn forms() -> Vec<(Order, Sampling, IntegrationOptions, f64)> {
     let steps = Sampling::Steps(0.1);
-    let small = |form| IntegrationOptions { table: Some([64, 64, 64]), ..IntegrationOptions::of(form) };
+    let small = |form| IntegrationOptions::of(form).with_table(Some([64, 64, 64]));
     vec![
         (Order::Two, Sampling::Voxels, IntegrationOptions::of(Form::SecondOrderPolynomial), 2e-2),
         (Order::Two, steps, IntegrationOptions::of(Form::SecondOrderPolynomial), 2e-2),
-        (Order::Two, steps, IntegrationOptions { degree: 1, ..small(Form::SecondOrderPolynomial) }, 2e-2),
-        (Order::Two, steps, IntegrationOptions { texels: Texels::Unorm16, ..small(Form::SecondOrderPolynomial) }, 2e-2),
+        (Order::Two, steps, small(Form::SecondOrderPolynomial).with_degree(1), 2e-2),
+        (Order::Two, steps, small(Form::SecondOrderPolynomial).with_texels(Texels::Unorm16), 2e-2),
         (Order::One, Sampling::Voxels, IntegrationOptions::of(Form::Volume), 2e-3),
         (Order::One, steps, IntegrationOptions::of(Form::Polynomial), 2e-3),
-        (
-            Order::One,
-            steps,
-            IntegrationOptions { texels: Texels::Unorm16, ..IntegrationOptions::of(Form::Volume) },
-            2e-3,
-        ),
+        (Order::One, steps, IntegrationOptions::of(Form::Volume).with_texels(Texels::Unorm16), 2e-3),
     ]
 }
 
@@ -116,8 +111,10 @@ fn published_tables_end_with_the_last_whole_slab() {
     let sampling = Sampling::Steps(0.02);
     let want = draw(&mut renderer, Order::Two, sampling, IntegrationOptions::default());
     let off = |renderer: &mut Renderer, n: u32, iterations: u32, texels| {
-        let choice =
-            IntegrationOptions { table: Some([n; 3]), iterations, texels, ..IntegrationOptions::of(Form::SecondOrder) };
+        let choice = IntegrationOptions::of(Form::SecondOrder)
+            .with_table(Some([n; 3]))
+            .with_iterations(iterations)
+            .with_texels(texels);
         draw(renderer, Order::Two, sampling, choice).compare(&want).unwrap().rmse
     };
     let coarse = off(&mut renderer, 16, 64, Texels::Float);
@@ -131,16 +128,12 @@ fn published_tables_end_with_the_last_whole_slab() {
     let mut renderer = self::renderer(&flat, &transfer);
     let long = Sampling::Steps(5.0);
     let plain = draw(&mut renderer, Order::Two, long, IntegrationOptions::default());
-    let none = draw(
-        &mut renderer,
-        Order::Two,
-        long,
-        IntegrationOptions { table: Some([8; 3]), ..IntegrationOptions::of(Form::SecondOrder) },
-    );
+    let none =
+        draw(&mut renderer, Order::Two, long, IntegrationOptions::of(Form::SecondOrder).with_table(Some([8; 3])));
     assert!(plain.pixels.iter().any(|p| p[3] > 0.1) && none.pixels.iter().all(|p| *p == [0.0; 4]));
     // For all lengths there is a table, whose diagonal is right.
     // The one value is 0 as it is mapped, and one of an odd number of texels.
-    let all = IntegrationOptions { table: Some([9; 3]), ..IntegrationOptions::of(Form::SecondOrderPolynomial) };
+    let all = IntegrationOptions::of(Form::SecondOrderPolynomial).with_table(Some([9; 3]));
     let error = draw(&mut renderer, Order::Two, long, all).compare(&plain).unwrap();
     assert!(error.max < 1e-5, "{:.1e}", error.max);
 }
@@ -159,8 +152,7 @@ fn knots_and_values_may_lie_beyond_each_other() {
             let transfer = knots(lo, hi).with_clamp(clamp);
             let mut renderer = renderer(&grid, &transfer);
             let want = draw(&mut renderer, Order::Two, Sampling::Voxels, IntegrationOptions::default());
-            let choice =
-                IntegrationOptions { table: Some([96; 3]), ..IntegrationOptions::of(Form::SecondOrderPolynomial) };
+            let choice = IntegrationOptions::of(Form::SecondOrderPolynomial).with_table(Some([96; 3]));
             let got = draw(&mut renderer, Order::Two, Sampling::Voxels, choice).compare(&want).unwrap();
             assert!(got.max < 0.1 && got.rmse < 0.02, "{lo} to {hi}, {clamp}: {:.1e} {:.1e}", got.max, got.rmse);
         }
@@ -172,7 +164,7 @@ fn knots_and_values_may_lie_beyond_each_other() {
 fn edits_do_not_stall_frames() {
     let grid = grid(wave);
     let mut renderer = renderer(&grid, &transfer());
-    let choice = IntegrationOptions { table: Some([64; 3]), ..IntegrationOptions::of(Form::SecondOrderPolynomial) };
+    let choice = IntegrationOptions::of(Form::SecondOrderPolynomial).with_table(Some([64; 3]));
     draw(&mut renderer, Order::Two, Sampling::Voxels, choice);
     let other = TransferFunction::new(vec![(0.0, [0.2, 0.9, 0.4])], vec![(90.0, 0.0), (200.0, 1.0)], 0.3).unwrap();
     renderer.set_transfer(&other);

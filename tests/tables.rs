@@ -75,15 +75,15 @@ fn bands() -> Scene {
 }
 
 fn volume(lengths: Kind, table: [u32; 3]) -> IntegrationOptions {
-    IntegrationOptions { lengths, table: Some(table), ..IntegrationOptions::of(Form::Volume) }
+    IntegrationOptions::of(Form::Volume).with_lengths(lengths).with_table(Some(table))
 }
 
 fn polynomial(degree: u32) -> IntegrationOptions {
-    IntegrationOptions { degree, table: Some([128, 128, 0]), ..IntegrationOptions::of(Form::Polynomial) }
+    IntegrationOptions::of(Form::Polynomial).with_degree(degree).with_table(Some([128, 128, 0]))
 }
 
 fn cylindrical(planes: Planes) -> IntegrationOptions {
-    IntegrationOptions { planes, table: Some([64, 64, 64]), ..IntegrationOptions::of(Form::Cylindrical) }
+    IntegrationOptions::of(Form::Cylindrical).with_planes(planes).with_table(Some([64, 64, 64]))
 }
 
 /// How much of the extinction a medium has that is thin: the approximations of every form are near to what is right there.
@@ -98,11 +98,11 @@ fn forms() -> Vec<(IntegrationOptions, Option<f64>, f64)> {
         (volume(Kind::LogNormalised, [128, 128, 12]), Some(2e-3), 4e-4),
         (polynomial(1), Some(3e-3), 4e-4),
         (polynomial(2), Some(2e-3), 4e-4),
-        (IntegrationOptions { alpha: Alpha::Linear, ..polynomial(2) }, None, 5e-3),
+        (polynomial(2).with_alpha(Alpha::Linear), None, 5e-3),
         (cylindrical(Planes::Two), Some(2e-2), 1.6e-3),
         (cylindrical(Planes::Packed), Some(2e-2), 1.6e-3),
         (cylindrical(Planes::One), None, 4e-3),
-        (IntegrationOptions { texels: Texels::Unorm8, ..volume(Kind::LogNormalised, [128, 128, 12]) }, None, 6e-4),
+        (volume(Kind::LogNormalised, [128, 128, 12]).with_texels(Texels::Unorm8), None, 6e-4),
     ]
 }
 
@@ -166,7 +166,7 @@ fn devices_build_what_they_draw_with() {
         for choice in [volume(Kind::LogNormalised, [128, 128, 12]), polynomial(2), cylindrical(Planes::Two)] {
             let [handed, built] = [Build::Host, Build::Device].map(|build| {
                 set(renderer, &scene);
-                let choice = IntegrationOptions { build, ..choice };
+                let choice = choice.with_build(build);
                 let first = image(renderer, choice, &view);
                 let uploaded = renderer.stats().uploaded_bytes;
                 assert!(renderer.stats().table_ms > 0.0, "{engine}, {build:?}");
@@ -183,7 +183,7 @@ fn devices_build_what_they_draw_with() {
             assert!(*engine == "cpu" || built.2 + 100_000 < handed.2, "{engine}: {} {}", built.2, handed.2);
         }
         // What a device cannot build, the host does.
-        let degree = IntegrationOptions { build: Build::Device, ..polynomial(6) };
+        let degree = polynomial(6).with_build(Build::Device);
         assert!(image(renderer, degree, &view).pixels.iter().any(|p| p[3] > 0.5), "{engine}");
     }
 }
@@ -209,13 +209,12 @@ fn a_plane_serves_a_cell_in_parallel_views() {
     let mut all = renderers();
     let Some((_, renderer)) = all.iter_mut().find(|r| r.0 == "project") else { return };
     set(renderer, &scene);
-    let per_cell = IntegrationOptions { per_cell: true, ..cylindrical(Planes::Two) };
+    let per_cell = cylindrical(Planes::Two).with_per_cell(true);
     let mut errors = |projection| {
         let view = view(projection);
         renderer.set_projection(ProjectionOptions::default());
         let by_fragment = image(renderer, cylindrical(Planes::Two), &view);
-        renderer
-            .set_projection(ProjectionOptions { fragments: Fragments::Interpolated, ..ProjectionOptions::default() });
+        renderer.set_projection(ProjectionOptions::default().with_fragments(Fragments::Interpolated));
         image(renderer, per_cell, &view).compare(&by_fragment).unwrap().max
     };
     let (parallel, perspective) = (errors(PARALLEL), errors(PERSPECTIVE));
@@ -386,7 +385,7 @@ fn reference_scenes_by_tables() {
     for (engine, renderer) in &mut all {
         set(renderer, &scene);
         let [linear, quadratic, quartic] = [1, 2, 4].map(|degree| {
-            let choice = IntegrationOptions { degree, ..IntegrationOptions::of(Form::Polynomial) };
+            let choice = IntegrationOptions::of(Form::Polynomial).with_degree(degree);
             image(renderer, choice, &view).compare(&truth).unwrap().rmse
         });
         eprintln!("coarse_bands, {engine}: degree 1 {linear:.1e}, 2 {quadratic:.1e}, 4 {quartic:.1e}");

@@ -4,7 +4,7 @@ use crate::output::misuse;
 use crate::variant::{named, table};
 use anyhow::Result;
 use clap::Args;
-use halite::integral::options::{Alpha, Build, Culling, IntegrationOptions, MOST_PIECES, Planes, Texels, Two, Weights};
+use halite::integral::options::{Alpha, Build, Culling, IntegrationOptions, MOST_PIECES, Planes, Texels, Weights};
 use halite::integral::table::Kind;
 
 /// What of the integral's form somebody said.
@@ -64,24 +64,22 @@ impl Integral {
     /// `choice`, with what was said in its place.
     pub fn apply(&self, choice: IntegrationOptions) -> IntegrationOptions {
         let choice = self.integral.as_deref().and_then(|name| choice.named(name).ok()).unwrap_or(choice);
-        IntegrationOptions {
-            form: choice.form,
-            table: self.table.or(choice.table),
-            lengths: self.lengths.unwrap_or(choice.lengths),
-            degree: self.degree.unwrap_or(choice.degree),
-            iterations: self.iterations.unwrap_or(choice.iterations),
-            alpha: self.alpha.unwrap_or(choice.alpha),
-            planes: self.planes.unwrap_or(choice.planes),
-            per_cell: self.plane_per_cell.unwrap_or(choice.per_cell),
-            texels: self.texels.unwrap_or(choice.texels),
-            build: self.build.unwrap_or(choice.build),
-            two: Two {
-                pieces: self.pieces.unwrap_or(choice.two.pieces),
-                weights: self.weights.unwrap_or(choice.two.weights),
-                culling: self.culling.unwrap_or(choice.two.culling),
-                ..choice.two
-            },
-        }
+        let two = choice.two;
+        let two = two
+            .with_pieces(self.pieces.unwrap_or(two.pieces))
+            .with_weights(self.weights.unwrap_or(two.weights))
+            .with_culling(self.culling.unwrap_or(two.culling));
+        choice
+            .with_table(self.table.or(choice.table))
+            .with_lengths(self.lengths.unwrap_or(choice.lengths))
+            .with_degree(self.degree.unwrap_or(choice.degree))
+            .with_iterations(self.iterations.unwrap_or(choice.iterations))
+            .with_alpha(self.alpha.unwrap_or(choice.alpha))
+            .with_planes(self.planes.unwrap_or(choice.planes))
+            .with_per_cell(self.plane_per_cell.unwrap_or(choice.per_cell))
+            .with_texels(self.texels.unwrap_or(choice.texels))
+            .with_build(self.build.unwrap_or(choice.build))
+            .with_two(two)
     }
 
     /// The names of the options that were given and are not the table's size.

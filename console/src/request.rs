@@ -221,17 +221,16 @@ pub fn prepare_step(options: &Request, given: Option<Scene>, steps: &mut Steps) 
             let seen = options.nan_color.is_none().then_some(&field);
             let first = automatic::camera(&mesh, &tetrahedra, seen, size);
             let framed = |camera| automatic::framed(&mesh, &tetrahedra, seen, camera, size);
-            let wishes = automatic::Wishes {
-                range: options.range,
-                values: steps.values,
-                map,
-                opacity: options.opacity.clone(),
-                unit_distance: options.unit_distance,
-                logarithmic: options.log,
-                blend: options.blend().unwrap_or_default(),
-                size: Some(size),
-                camera: Some(options.camera.framed(first, framed)),
-            };
+            let wishes = automatic::Wishes::default()
+                .with_range(options.range)
+                .with_values(steps.values)
+                .with_map(map)
+                .with_opacity(options.opacity.clone())
+                .with_unit_distance(options.unit_distance)
+                .with_logarithmic(options.log)
+                .with_blend(options.blend().unwrap_or_default())
+                .with_size(Some(size))
+                .with_camera(Some(options.camera.framed(first, framed)));
             let mut scene = automatic::scene(&mesh, &tetrahedra, scalars.clone(), &field, wishes)?;
             let look = steps.look.get_or_insert_with(|| (scene.transfer.clone(), scene.camera));
             (scene.transfer, scene.camera) = look.clone();
@@ -373,7 +372,7 @@ impl Request {
             return Err(output::misuse(format!("{given}: study draws all variants, so none can be chosen")));
         }
         let choice = self.integral.apply(scene.map(|s| s.integral).unwrap_or_default());
-        self.integral.check(&IntegrationOptions { form: Form::Volume, ..choice })?;
+        self.integral.check(&choice.with_form(Form::Volume))?;
         let left: Vec<_> = scene.map_or(vec![], |s| {
             let said = [
                 ("projection", s.projection != ProjectionOptions::default()),

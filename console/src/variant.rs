@@ -36,15 +36,14 @@ pub struct Variant {
 impl Variant {
     /// `projection`, with what was said in its place.
     pub fn apply(&self, projection: ProjectionOptions) -> ProjectionOptions {
-        ProjectionOptions {
-            fragments: self.fragments.unwrap_or(projection.fragments),
-            thickness: self.thickness.unwrap_or(projection.thickness),
-            order: self.order.unwrap_or(projection.order),
-            cycles: self.cycles.unwrap_or(projection.cycles),
-            target: self.target.unwrap_or(projection.target),
-            dither: self.dither.unwrap_or(projection.dither),
-            compositing: self.compositing.unwrap_or(projection.compositing),
-        }
+        projection
+            .with_fragments(self.fragments.unwrap_or(projection.fragments))
+            .with_thickness(self.thickness.unwrap_or(projection.thickness))
+            .with_order(self.order.unwrap_or(projection.order))
+            .with_cycles(self.cycles.unwrap_or(projection.cycles))
+            .with_target(self.target.unwrap_or(projection.target))
+            .with_dither(self.dither.unwrap_or(projection.dither))
+            .with_compositing(self.compositing.unwrap_or(projection.compositing))
     }
 
     /// The names of the options that were given.

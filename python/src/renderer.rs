@@ -256,7 +256,7 @@ pub(crate) fn automatic(
         };
         let tetrahedra = Tetrahedra::new(mesh)?;
         let field = scalars.field(mesh)?;
-        let wishes = scene::automatic::Wishes { size: Some(size), ..Default::default() };
+        let wishes = scene::automatic::Wishes::default().with_size(Some(size));
         let scene = scene::automatic::scene(mesh, &tetrahedra, scalars, &field, wishes)?;
         let view = halite::view::View::new(scene.camera, size)?;
         Ok((scene.scalars, field.association() == Association::Cell, view, scene.transfer))

@@ -1,5 +1,7 @@
 //! Which form of the ray-segment integral draws.
 
+mod setters;
+
 use super::Exact;
 use super::table::{Kind, MOST_OF_ALL_LENGTHS};
 use crate::error::{Error, Result};
@@ -8,6 +10,7 @@ use serde::{Deserialize, Serialize};
 /// A form of the ray-segment integral and, for tables, what differs between the published ones. The default is exact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
+#[non_exhaustive]
 pub struct IntegrationOptions {
     /// The form.
     pub form: Form,
@@ -119,6 +122,7 @@ impl Form {
 /// How segments of two variables, or with light, are integrated, and what differs between published variants.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, rename_all = "kebab-case", deny_unknown_fields)]
+#[non_exhaustive]
 pub struct Two {
     /// The method.
     pub method: Method,

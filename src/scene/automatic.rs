@@ -32,6 +32,7 @@ const SOLID: [f64; 3] = [0.78, 0.82, 0.88];
 
 /// What of the look somebody did say.
 #[derive(Debug, Clone, Default)]
+#[non_exhaustive]
 pub struct Wishes {
     /// The scalars that colours and opacities range over.
     pub range: Option<[f64; 2]>,
@@ -51,6 +52,62 @@ pub struct Wishes {
     pub size: Option<[u32; 2]>,
     /// From where the mesh is seen; [`camera`] if nobody says.
     pub camera: Option<Camera>,
+}
+
+impl Wishes {
+    /// The same with another [`Wishes::range`].
+    #[must_use]
+    pub fn with_range(self, range: Option<[f64; 2]>) -> Self {
+        Wishes { range, ..self }
+    }
+
+    /// The same with another [`Wishes::values`].
+    #[must_use]
+    pub fn with_values(self, values: Option<[f64; 2]>) -> Self {
+        Wishes { values, ..self }
+    }
+
+    /// The same with another [`Wishes::map`].
+    #[must_use]
+    pub fn with_map(self, map: Option<ColorMap>) -> Self {
+        Wishes { map, ..self }
+    }
+
+    /// The same with another [`Wishes::opacity`].
+    #[must_use]
+    pub fn with_opacity(self, opacity: Option<Opacity>) -> Self {
+        Wishes { opacity, ..self }
+    }
+
+    /// The same with another [`Wishes::unit_distance`].
+    #[must_use]
+    pub fn with_unit_distance(self, unit_distance: Option<f64>) -> Self {
+        Wishes { unit_distance, ..self }
+    }
+
+    /// The same with another [`Wishes::logarithmic`].
+    #[must_use]
+    pub fn with_logarithmic(self, logarithmic: bool) -> Self {
+        Wishes { logarithmic, ..self }
+    }
+
+    /// The same with another [`Wishes::blend`].
+    #[must_use]
+    pub fn with_blend(self, blend: Blend) -> Self {
+        Wishes { blend, ..self }
+    }
+
+    /// The same with another [`Wishes::size`].
+    #[must_use]
+    pub fn with_size(self, size: Option<[u32; 2]>) -> Self {
+        Wishes { size, ..self }
+    }
+
+    /// The same with another [`Wishes::camera`].
+    #[must_use]
+    pub fn with_camera(self, camera: Option<Camera>) -> Self {
+        Wishes { camera, ..self }
+    }
 }
 
 /// Where a knot of an opacity function is.

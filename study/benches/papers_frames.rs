@@ -128,21 +128,16 @@ fn tiles_against_volumes(mut renderer: Renderer) {
     };
     let color = (0..4).flat_map(band).collect();
     renderer.set_transfer(&TransferFunction::new(color, vec![(0.0, 1.0)], 0.5).expect("a function"));
-    let projection =
-        ProjectionOptions { fragments: Fragments::Interpolated, target: Target::Rgba8, ..ProjectionOptions::default() };
+    let projection = ProjectionOptions::default().with_fragments(Fragments::Interpolated).with_target(Target::Rgba8);
     let texels = Texels::Unorm8;
-    let volume = IntegrationOptions {
-        lengths: Kind::Uniform,
-        table: Some([64; 3]),
-        texels,
-        ..IntegrationOptions::of(Form::Volume)
-    };
-    let tiles = |planes, per_cell| IntegrationOptions {
-        planes,
-        per_cell,
-        table: Some([64; 3]),
-        texels,
-        ..IntegrationOptions::of(Form::Cylindrical)
+    let volume =
+        IntegrationOptions::of(Form::Volume).with_lengths(Kind::Uniform).with_table(Some([64; 3])).with_texels(texels);
+    let tiles = |planes, per_cell| {
+        IntegrationOptions::of(Form::Cylindrical)
+            .with_planes(planes)
+            .with_per_cell(per_cell)
+            .with_table(Some([64; 3]))
+            .with_texels(texels)
     };
     println!("  {:44} {:>8}", "", "frames/s");
     for (name, choice, projection) in [
@@ -213,8 +208,7 @@ fn sorts_and_data(mut renderer: Renderer) {
             ("by circumspheres", Order::Circumsphere),
             ("none", Order::None),
         ] {
-            let projection =
-                ProjectionOptions { order, fragments: Fragments::Interpolated, ..ProjectionOptions::default() };
+            let projection = ProjectionOptions::default().with_order(order).with_fragments(Fragments::Interpolated);
             renderer.set_projection(projection);
             let camera = |step: f64| around(low.midpoint(high), (high - low).length() / 2.0, step);
             let rate = rate(&mut renderer, camera, [1280, 960], true);

@@ -98,12 +98,13 @@ const LINES: usize = 24;
 /// From the fewest enhancements to the most, then what else can be switched; with tables of this size, if it was said.
 fn variants(table: Option<[u32; 3]>) -> Vec<Variant> {
     let best = ProjectionOptions::default();
-    let volume =
-        |lengths, texels| IntegrationOptions { lengths, texels, table, ..IntegrationOptions::of(Form::Volume) };
+    let volume = |lengths, texels| {
+        IntegrationOptions::of(Form::Volume).with_lengths(lengths).with_texels(texels).with_table(table)
+    };
     let (uniform, log) = (volume(Kind::Uniform, Texels::Unorm16), volume(Kind::Log, Texels::Unorm16));
-    let interpolated = ProjectionOptions { fragments: Fragments::Interpolated, ..best };
-    let linear = ProjectionOptions { fragments: Fragments::Linear, ..best };
-    let eight = |projection| ProjectionOptions { target: Target::Rgba8, ..projection };
+    let interpolated = best.with_fragments(Fragments::Interpolated);
+    let linear = best.with_fragments(Fragments::Linear);
+    let eight = |projection: ProjectionOptions| projection.with_target(Target::Rgba8);
     let frame_buffer = eight(interpolated);
     let exact = IntegrationOptions::default();
     let variant = |name, place, projection, integral| Variant { name, place, projection, integral };
@@ -112,20 +113,20 @@ fn variants(table: Option<[u32; 3]>) -> Vec<Variant> {
         variant("+ perspective", "table 1 ii", frame_buffer, volume(Kind::Uniform, Texels::Unorm8)),
         variant("+ 16-bit table", "table 1 iii", frame_buffer, uniform),
         variant("+ logarithmic", "table 1 iv, figure 9a", frame_buffer, log),
-        variant("+ alpha dithering", "table 1, figure 9b", ProjectionOptions { dither: true, ..frame_buffer }, log),
+        variant("+ alpha dithering", "table 1, figure 9b", frame_buffer.with_dither(true), log),
         variant("+ 32-bit float target", "table 1, figures 7c 8b 9c 10b", interpolated, log),
-        variant("16-bit float target", "", ProjectionOptions { target: Target::Rgba16float, ..interpolated }, log),
+        variant("16-bit float target", "", interpolated.with_target(Target::Rgba16float), log),
         variant("8-bit table", "figure 7a", interpolated, volume(Kind::Log, Texels::Unorm8)),
         variant("8-bit target", "figure 7b", frame_buffer, log),
         variant("screen-linear", "figure 8a", linear, log),
-        variant("thickness by depth", "", ProjectionOptions { thickness: Thickness::Depth, ..interpolated }, log),
+        variant("thickness by depth", "", interpolated.with_thickness(Thickness::Depth), log),
         variant("uniform thickness", "figure 10a", interpolated, uniform),
         variant("log-normalised, float", "", interpolated, volume(Kind::LogNormalised, Texels::Float)),
         variant("interpolated, exact", "", interpolated, exact),
         variant("intersected, exact", "", best, exact),
-        variant("by depth", "", ProjectionOptions { order: Order::Depth, ..best }, exact),
-        variant("by circumspheres", "", ProjectionOptions { order: Order::Circumsphere, ..best }, exact),
-        variant("not sorted", "", ProjectionOptions { order: Order::None, ..best }, exact),
+        variant("by depth", "", best.with_order(Order::Depth), exact),
+        variant("by circumspheres", "", best.with_order(Order::Circumsphere), exact),
+        variant("not sorted", "", best.with_order(Order::None), exact),
     ]
 }
 
@@ -225,11 +226,7 @@ fn draw(variant: Variant, frames: u32, renderer: &mut Renderer, view: &View, tru
         Order::Mpvo | Order::Mpvonc | Order::Xmpvo => Order::MpvoConvex,
         Order::Depth | Order::Circumsphere | Order::None => Order::None,
     };
-    renderer.set_projection(ProjectionOptions {
-        order: other,
-        fragments: Fragments::Intersected,
-        ..variant.projection
-    });
+    renderer.set_projection(variant.projection.with_order(other).with_fragments(Fragments::Intersected));
     if variant.projection.order != Order::None {
         renderer.render(view, &|_| ())?;
     }

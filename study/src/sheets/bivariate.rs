@@ -57,10 +57,8 @@ struct Figure {
 
 /// A segment's integral in another form.
 fn two(method: Method, weights: Weights, culling: Culling) -> IntegrationOptions {
-    IntegrationOptions {
-        two: Two { method, pieces: PIECES, weights, culling, ..Two::default() },
-        ..IntegrationOptions::default()
-    }
+    IntegrationOptions::default()
+        .with_two(Two::default().with_method(method).with_pieces(PIECES).with_weights(weights).with_culling(culling))
 }
 
 /// The rows of the table: those after the first are of the Gaussian.

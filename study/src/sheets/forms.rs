@@ -26,17 +26,15 @@ struct Line {
 
 /// All forms, of tables of this size if it was said; or those that are of interest where fragments are interpolated.
 fn forms(interpolated: bool, table: Option<[u32; 3]>) -> Vec<(&'static str, IntegrationOptions)> {
-    let volume = |lengths, slices| IntegrationOptions {
-        lengths,
-        table: table.or(Some([256, 256, slices])),
-        ..IntegrationOptions::of(Form::Volume)
+    let volume = |lengths, slices| {
+        IntegrationOptions::of(Form::Volume).with_lengths(lengths).with_table(table.or(Some([256, 256, slices])))
     };
-    let polynomial = |degree| IntegrationOptions { degree, table, ..IntegrationOptions::of(Form::Polynomial) };
-    let cylindrical = |planes, per_cell| IntegrationOptions {
-        planes,
-        per_cell,
-        table: table.or(Some([PLANES; 3])),
-        ..IntegrationOptions::of(Form::Cylindrical)
+    let polynomial = |degree| IntegrationOptions::of(Form::Polynomial).with_degree(degree).with_table(table);
+    let cylindrical = |planes, per_cell| {
+        IntegrationOptions::of(Form::Cylindrical)
+            .with_planes(planes)
+            .with_per_cell(per_cell)
+            .with_table(table.or(Some([PLANES; 3])))
     };
     let two = |per_cell| cylindrical(Planes::Two, per_cell);
     if interpolated {
@@ -51,7 +49,7 @@ fn forms(interpolated: bool, table: Option<[u32; 3]>) -> Vec<(&'static str, Inte
         ("volume, uniform", volume(Kind::Uniform, 64)),
         ("volume, log", volume(Kind::Log, 16)),
         ("volume, log-normalised", volume(Kind::LogNormalised, 16)),
-        ("polynomial, linear alpha", IntegrationOptions { alpha: Alpha::Linear, ..polynomial(1) }),
+        ("polynomial, linear alpha", polynomial(1).with_alpha(Alpha::Linear)),
         ("polynomial, degree 1", polynomial(1)),
         ("polynomial, degree 2", polynomial(2)),
         ("polynomial, degree 4", polynomial(4)),
@@ -82,7 +80,7 @@ pub(super) fn run(options: &Options, threads: usize) -> Result<()> {
         let Stats { engine, adapter, .. } = renderer.stats().clone();
         let name = format!("{engine} on {adapter}");
         let best = ProjectionOptions::default();
-        let interpolated = ProjectionOptions { fragments: Fragments::Interpolated, ..best };
+        let interpolated = best.with_fragments(Fragments::Interpolated);
         let mut all: Vec<_> = forms(false, size).into_iter().map(|f| (f, best)).collect();
         if engine == "project" {
             all.extend(forms(true, size).into_iter().map(|f| (f, interpolated)));

@@ -113,7 +113,7 @@ fn studied(
         for (i, (name, place, rule, order)) in ORDERS.into_iter().enumerate() {
             p(i as f64 / ORDERS.len() as f64);
             // Cycles are not left to the walk: what is wrong shows.
-            let projection = ProjectionOptions { order, cycles: Cycles::Cut, ..ProjectionOptions::default() };
+            let projection = ProjectionOptions::default().with_order(order).with_cycles(Cycles::Cut);
             let variant = Variant { name, place, projection, integral: IntegrationOptions::default() };
             match draw(variant, options.frames, renderer, &view, &truth) {
                 Ok(row) => {

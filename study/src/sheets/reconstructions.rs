@@ -56,7 +56,7 @@ impl Volume {
         let tetrahedra = Tetrahedra::new(&mesh).with_context(|| path.display().to_string())?;
         let scalars = automatic::scalars(&mesh, Some(Association::Point))?;
         let field = scalars.field(&mesh)?;
-        let wishes = automatic::Wishes { size: Some(size), ..Default::default() };
+        let wishes = automatic::Wishes::default().with_size(Some(size));
         let scene = automatic::scene(&mesh, &tetrahedra, scalars.clone(), &field, wishes)?;
         let field = scalars.field(&grid)?;
         let [lo, hi] = field.range(0);

@@ -164,10 +164,8 @@ impl Studio<'_> {
     /// Figure 6: what tables take by their steps, and from how many on pictures of bytes are the same.
     fn tables(&mut self, all: &mut Pictures, device: &DeviceChoice) -> Result<()> {
         let sampling = Sampling::Steps(2.0 * self.volume.samples.width());
-        let choice = |iterations| IntegrationOptions {
-            iterations,
-            table: Some([TEXELS; 3]),
-            ..IntegrationOptions::of(Form::SecondOrder)
+        let choice = |iterations| {
+            IntegrationOptions::of(Form::SecondOrder).with_iterations(iterations).with_table(Some([TEXELS; 3]))
         };
         let mut drawn = vec![];
         for (iterations, theirs) in ITERATIONS {
@@ -229,17 +227,14 @@ impl Studio<'_> {
             let sampling = Sampling::Steps(voxels * self.volume.samples.width());
             let (number, table, bits) = match order {
                 Order::One => {
-                    let form = IntegrationOptions {
-                        lengths: Kind::LogNormalised,
-                        table: Some([256, 256, 16]),
-                        ..IntegrationOptions::of(Form::Volume)
-                    };
-                    (1, IntegrationOptions { texels: Texels::Unorm16, ..form }, "16")
+                    let form = IntegrationOptions::of(Form::Volume)
+                        .with_lengths(Kind::LogNormalised)
+                        .with_table(Some([256, 256, 16]));
+                    (1, form.with_texels(Texels::Unorm16), "16")
                 }
                 _ => {
-                    let form =
-                        IntegrationOptions { table: Some([TEXELS; 3]), ..IntegrationOptions::of(Form::SecondOrder) };
-                    (2, IntegrationOptions { texels: Texels::Unorm8, ..form }, "8")
+                    let form = IntegrationOptions::of(Form::SecondOrder).with_table(Some([TEXELS; 3]));
+                    (2, form.with_texels(Texels::Unorm8), "8")
                 }
             };
             for (choice, bits) in [(table, bits), (IntegrationOptions::default(), "none")] {
