@@ -25,5 +25,5 @@ mod volume;
 pub(crate) use gradient::Gradients;
 pub use histogram::histogram;
 pub(crate) use ray::{Frame, render};
-pub use reconstruction::{Order, Reconstruction, Sampling};
+pub use reconstruction::{Reconstruction, ReconstructionOrder, Sampling};
 pub(crate) use volume::{Samples, Volume};

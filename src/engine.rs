@@ -17,14 +17,14 @@ pub enum Engine {
     Project,
 }
 
-impl FromStr for cast::Order {
+impl FromStr for cast::ReconstructionOrder {
     type Err = String;
 
     /// The order that options know by this name. What is wrong with another names those that there are.
     fn from_str(name: &str) -> Result<Self, String> {
-        let found = cast::Order::ALL.into_iter().find(|(known, _)| *known == name);
+        let found = cast::ReconstructionOrder::ALL.into_iter().find(|(known, _)| *known == name);
         found.map(|(_, order)| order).ok_or_else(|| {
-            let known = cast::Order::ALL.map(|(known, _)| known).join(", ");
+            let known = cast::ReconstructionOrder::ALL.map(|(known, _)| known).join(", ");
             format!("\"{name}\" is not known here; there is {known}")
         })
     }

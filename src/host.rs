@@ -8,7 +8,7 @@ mod tests;
 
 pub use log::{Log, carried};
 
-use crate::cast::{Order, Reconstruction, Sampling};
+use crate::cast::{Reconstruction, ReconstructionOrder, Sampling};
 use crate::error::{Error, Result};
 use crate::field::Field;
 use crate::gpu::DeviceChoice;
@@ -130,7 +130,7 @@ impl Session {
     /// [`Error::Render`] if no order is called so, or the distance is negative or not finite.
     pub fn set_reconstruction(&mut self, order: &str, distance: f64) -> Result<()> {
         let order = match order {
-            "" => Order::Exact,
+            "" => ReconstructionOrder::Exact,
             name => name.parse().map_err(|e| Error::Render(format!("reconstruction: {e}")))?,
         };
         if !(distance >= 0.0 && distance.is_finite()) {

@@ -20,8 +20,8 @@ pub struct ProjectionOptions {
     /// How long a ray's way through a cell is; not for [`Fragments::Intersected`].
     pub thickness: Thickness,
     /// In which sequence cells are drawn.
-    pub order: Order,
-    /// What becomes of pixels that see cells which hide each other in a circle, with [`Order::Mpvo`].
+    pub order: CellOrder,
+    /// What becomes of pixels that see cells which hide each other in a circle, with [`CellOrder::Mpvo`].
     pub cycles: Cycles,
     /// What cells are blended into.
     pub target: Target,
@@ -59,7 +59,7 @@ impl ProjectionOptions {
 
     /// The same with another [`ProjectionOptions::order`].
     #[must_use]
-    pub fn with_order(self, order: Order) -> Self {
+    pub fn with_order(self, order: CellOrder) -> Self {
         ProjectionOptions { order, ..self }
     }
 
@@ -116,7 +116,7 @@ pub enum Thickness {
 /// In which sequence cells are drawn.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Order {
+pub enum CellOrder {
     /// From back to front by the faces between them, and by the rays that leave the mesh and enter it again: right for every pixel
     /// ([`crate::order::mpvo`]). It needs the cells' neighbours; in a mesh that changes with each frame it is [`Self::Depth`].
     #[default]
@@ -136,15 +136,15 @@ pub enum Order {
     None,
 }
 
-impl Order {
+impl CellOrder {
     /// The rule of the mesh's order; none for sequences that need no neighbours.
     pub(crate) fn rule(self) -> Option<Rule> {
         match self {
-            Order::Mpvo => Some(Rule::Mpvo),
-            Order::MpvoConvex => Some(Rule::Convex),
-            Order::Mpvonc => Some(Rule::Nonconvex),
-            Order::Xmpvo => Some(Rule::Xmpvo),
-            Order::Depth | Order::Circumsphere | Order::None => None,
+            CellOrder::Mpvo => Some(Rule::Mpvo),
+            CellOrder::MpvoConvex => Some(Rule::Convex),
+            CellOrder::Mpvonc => Some(Rule::Nonconvex),
+            CellOrder::Xmpvo => Some(Rule::Xmpvo),
+            CellOrder::Depth | CellOrder::Circumsphere | CellOrder::None => None,
         }
     }
 }
@@ -190,7 +190,7 @@ pub(crate) struct ProjectionCounts {
     /// Cells that were drawn.
     pub(crate) cells: u64,
     /// What they were ordered by.
-    pub(crate) order: Order,
+    pub(crate) order: CellOrder,
     /// Finding the cells that are seen and sorting them; 0 where the order was known.
     pub(crate) order_ms: f64,
     /// How often cells were sorted.

@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stderr, reason = "a test fails by panicking")]
 
 use glam::{DMat3, DVec3};
-use halite::cast::{Order, Reconstruction, Sampling};
+use halite::cast::{Reconstruction, ReconstructionOrder, Sampling};
 use halite::field::{Association, Component, Field};
 use halite::gpu::DeviceChoice;
 use halite::grid::{Grid, Lattice};
@@ -327,12 +327,12 @@ fn orders_are_exact_for_their_degree() {
             Lattice { origin: DVec3::splat(-1.0), spacing: DVec3::splat(2.0), size: [2; 3], ..Lattice::default() };
         Grid::regular(&lattice, vec![array("s", 1, Values::F64(corners))], vec![]).unwrap()
     };
-    let cases: [(Order, Value, Value); 5] = [
-        (Order::Two, |p| 0.6 * p.x * p.y + 0.3 * p.z, |p| p.x * p.y * p.z),
-        (Order::One, |p| 0.3 * p.x - 0.4 * p.y + 0.2 * p.z, |p| 0.6 * p.x * p.y),
-        (Order::Midpoint, |_| 0.2, |p| 0.4 * p.x),
-        (Order::Left, |_| 0.2, |p| 0.4 * p.x),
-        (Order::Right, |_| 0.2, |p| 0.4 * p.x),
+    let cases: [(ReconstructionOrder, Value, Value); 5] = [
+        (ReconstructionOrder::Two, |p| 0.6 * p.x * p.y + 0.3 * p.z, |p| p.x * p.y * p.z),
+        (ReconstructionOrder::One, |p| 0.3 * p.x - 0.4 * p.y + 0.2 * p.z, |p| 0.6 * p.x * p.y),
+        (ReconstructionOrder::Midpoint, |_| 0.2, |p| 0.4 * p.x),
+        (ReconstructionOrder::Left, |_| 0.2, |p| 0.4 * p.x),
+        (ReconstructionOrder::Right, |_| 0.2, |p| 0.4 * p.x),
     ];
     for (order, exact, beyond) in cases {
         for sampling in SAMPLINGS {
@@ -352,7 +352,14 @@ fn orders_are_exact_for_their_degree() {
 }
 
 /// Root mean square of what an order is off by from the field itself.
-fn rmse(grid: &Grid, s: &Field, transfer: &TransferFunction, view: &View, order: Order, sampling: Sampling) -> f64 {
+fn rmse(
+    grid: &Grid,
+    s: &Field,
+    transfer: &TransferFunction,
+    view: &View,
+    order: ReconstructionOrder,
+    sampling: Sampling,
+) -> f64 {
     let (made, truth) =
         (rebuilt(grid, s, transfer, view, Reconstruction { order, sampling }), image(grid, s, transfer, view));
     let pairs = made.pixels.as_flattened().iter().zip(truth.pixels.as_flattened());
@@ -383,10 +390,17 @@ fn higher_orders_are_nearer() {
         TransferFunction::new(transfer().color().to_vec(), vec![(0.0, 0.0), (0.4, 0.5), (0.7, 0.1), (1.0, 0.8)], 0.3)
             .unwrap();
     let off = |order, sampling| rmse(&grid, &s, &smooth, &view(), order, sampling);
-    let [two, one, zero] = [Order::Two, Order::One, Order::Midpoint].map(|order| off(order, Sampling::Voxels));
+    let [two, one, zero] = [ReconstructionOrder::Two, ReconstructionOrder::One, ReconstructionOrder::Midpoint]
+        .map(|order| off(order, Sampling::Voxels));
     eprintln!("by voxels: {two:.1e} {one:.1e} {zero:.1e}");
     assert!(two * 3.0 < one && one < zero, "{two:.1e} {one:.1e} {zero:.1e}");
-    for order in [Order::Two, Order::One, Order::Midpoint, Order::Left, Order::Right] {
+    for order in [
+        ReconstructionOrder::Two,
+        ReconstructionOrder::One,
+        ReconstructionOrder::Midpoint,
+        ReconstructionOrder::Left,
+        ReconstructionOrder::Right,
+    ] {
         let [coarse, fine] = [0.04, 0.01].map(|step| off(order, Sampling::Steps(step)));
         eprintln!("{order:?}: {coarse:.1e} {fine:.1e}");
         assert!(fine * 2.0 < coarse, "{order:?}: {coarse:.1e} {fine:.1e}");
@@ -401,7 +415,8 @@ fn steps_are_lengths() {
         renderer.set_grid(&grid).unwrap();
         renderer.set_field(&field(&grid, "s", Component::Index(0))).unwrap();
         renderer.set_transfer(&transfer());
-        renderer.set_reconstruction(Reconstruction { order: Order::One, sampling: Sampling::Steps(step) });
+        renderer
+            .set_reconstruction(Reconstruction { order: ReconstructionOrder::One, sampling: Sampling::Steps(step) });
         let error = renderer.render(&view(), &|_| {}).unwrap_err().to_string();
         assert!(error.contains("steps of"), "{error}");
     }

@@ -12,7 +12,7 @@ use halite::image::Image;
 use halite::integral::options::{Form, IntegrationOptions, Texels};
 use halite::integral::table::Kind;
 use halite::mesh::{Array, Mesh, Values, generate};
-use halite::project::{Compositing, Cycles, Fragments, Order, ProjectionOptions, Target, Thickness};
+use halite::project::{CellOrder, Compositing, Cycles, Fragments, ProjectionOptions, Target, Thickness};
 use halite::render::{self, Renderer};
 use halite::transfer::{Convention, Emission, TransferFunction};
 use halite::view::{Blend, Camera, Projection, View};
@@ -315,7 +315,15 @@ fn blurred(image: &Image) -> Image {
 #[test]
 fn orders_cure_one_another() {
     let order = |order| ProjectionOptions::default().with_order(order);
-    let variants = [Order::None, Order::MpvoConvex, Order::Mpvonc, Order::Depth, Order::Xmpvo, Order::Mpvo].map(order);
+    let variants = [
+        CellOrder::None,
+        CellOrder::MpvoConvex,
+        CellOrder::Mpvonc,
+        CellOrder::Depth,
+        CellOrder::Xmpvo,
+        CellOrder::Mpvo,
+    ]
+    .map(order);
     let Some([none, convex, nonconvex, depth, xmpvo, mpvo]) = errors(&holes(), variants) else { return };
     eprintln!(
         "no order {none:.1e}, MPVO {convex:.1e}, MPVONC {nonconvex:.1e}, depth {depth:.1e}, XMPVO {xmpvo:.1e}, ours {mpvo:.1e}"
@@ -355,14 +363,14 @@ fn a_mesh_that_changes_with_each_frame_is_drawn_by_depth() {
     let (scene, view) = holes();
     let order = |renderer: &Renderer| renderer.stats().projection.unwrap().order;
     let log = halite::host::Log::default();
-    for wanted in [(Order::Mpvo, 0), (Order::Mpvo, 0), (Order::Depth, 1), (Order::Depth, 0)] {
+    for wanted in [(CellOrder::Mpvo, 0), (CellOrder::Mpvo, 0), (CellOrder::Depth, 1), (CellOrder::Depth, 0)] {
         set(&mut renderer, &scene);
         log.collect(|| image(&mut renderer, ProjectionOptions::default(), &view));
         let said = log.take().iter().filter(|line| line.contains("in the order of their depths")).count();
         assert_eq!((order(&renderer), said), wanted);
     }
     let still = image(&mut renderer, ProjectionOptions::default(), &view);
-    assert_eq!(order(&renderer), Order::Mpvo);
+    assert_eq!(order(&renderer), CellOrder::Mpvo);
     assert!(still.compare(&Engine::Reference.image(&scene, &view)).unwrap().max < 2e-5);
 }
 

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use glam::{DMat3, DVec3};
-use halite::cast::{Order, Reconstruction, Sampling};
+use halite::cast::{Reconstruction, ReconstructionOrder, Sampling};
 use halite::field::{Component, Field};
 use halite::gpu::DeviceChoice;
 use halite::grid::{Grid, Lattice};
@@ -59,7 +59,7 @@ fn renderer(grid: &Grid, transfer: &TransferFunction) -> Renderer {
     renderer
 }
 
-fn draw(renderer: &mut Renderer, order: Order, sampling: Sampling, choice: IntegrationOptions) -> Image {
+fn draw(renderer: &mut Renderer, order: ReconstructionOrder, sampling: Sampling, choice: IntegrationOptions) -> Image {
     renderer.set_reconstruction(Reconstruction { order, sampling });
     renderer.set_integral(choice);
     let image = renderer.render(&view(), &|_| ()).unwrap();
@@ -68,17 +68,17 @@ fn draw(renderer: &mut Renderer, order: Order, sampling: Sampling, choice: Integ
 }
 
 /// Every form with the reconstructions that read it, and how far its pictures may be from those of the integral.
-fn forms() -> Vec<(Order, Sampling, IntegrationOptions, f64)> {
+fn forms() -> Vec<(ReconstructionOrder, Sampling, IntegrationOptions, f64)> {
     let steps = Sampling::Steps(0.1);
     let small = |form| IntegrationOptions::of(form).with_table(Some([64, 64, 64]));
     vec![
-        (Order::Two, Sampling::Voxels, IntegrationOptions::of(Form::SecondOrderPolynomial), 2e-2),
-        (Order::Two, steps, IntegrationOptions::of(Form::SecondOrderPolynomial), 2e-2),
-        (Order::Two, steps, small(Form::SecondOrderPolynomial).with_degree(1), 2e-2),
-        (Order::Two, steps, small(Form::SecondOrderPolynomial).with_texels(Texels::Unorm16), 2e-2),
-        (Order::One, Sampling::Voxels, IntegrationOptions::of(Form::Volume), 2e-3),
-        (Order::One, steps, IntegrationOptions::of(Form::Polynomial), 2e-3),
-        (Order::One, steps, IntegrationOptions::of(Form::Volume).with_texels(Texels::Unorm16), 2e-3),
+        (ReconstructionOrder::Two, Sampling::Voxels, IntegrationOptions::of(Form::SecondOrderPolynomial), 2e-2),
+        (ReconstructionOrder::Two, steps, IntegrationOptions::of(Form::SecondOrderPolynomial), 2e-2),
+        (ReconstructionOrder::Two, steps, small(Form::SecondOrderPolynomial).with_degree(1), 2e-2),
+        (ReconstructionOrder::Two, steps, small(Form::SecondOrderPolynomial).with_texels(Texels::Unorm16), 2e-2),
+        (ReconstructionOrder::One, Sampling::Voxels, IntegrationOptions::of(Form::Volume), 2e-3),
+        (ReconstructionOrder::One, steps, IntegrationOptions::of(Form::Polynomial), 2e-3),
+        (ReconstructionOrder::One, steps, IntegrationOptions::of(Form::Volume).with_texels(Texels::Unorm16), 2e-3),
     ]
 }
 
@@ -109,13 +109,13 @@ fn published_tables_end_with_the_last_whole_slab() {
     let (grid, transfer) = (grid(wave), transfer());
     let mut renderer = renderer(&grid, &transfer);
     let sampling = Sampling::Steps(0.02);
-    let want = draw(&mut renderer, Order::Two, sampling, IntegrationOptions::default());
+    let want = draw(&mut renderer, ReconstructionOrder::Two, sampling, IntegrationOptions::default());
     let off = |renderer: &mut Renderer, n: u32, iterations: u32, texels| {
         let choice = IntegrationOptions::of(Form::SecondOrder)
             .with_table(Some([n; 3]))
             .with_iterations(iterations)
             .with_texels(texels);
-        draw(renderer, Order::Two, sampling, choice).compare(&want).unwrap().rmse
+        draw(renderer, ReconstructionOrder::Two, sampling, choice).compare(&want).unwrap().rmse
     };
     let coarse = off(&mut renderer, 16, 64, Texels::Float);
     let fine = off(&mut renderer, 128, 64, Texels::Float);
@@ -127,14 +127,18 @@ fn published_tables_end_with_the_last_whole_slab() {
     let flat = self::grid(|_| 0.2);
     let mut renderer = self::renderer(&flat, &transfer);
     let long = Sampling::Steps(5.0);
-    let plain = draw(&mut renderer, Order::Two, long, IntegrationOptions::default());
-    let none =
-        draw(&mut renderer, Order::Two, long, IntegrationOptions::of(Form::SecondOrder).with_table(Some([8; 3])));
+    let plain = draw(&mut renderer, ReconstructionOrder::Two, long, IntegrationOptions::default());
+    let none = draw(
+        &mut renderer,
+        ReconstructionOrder::Two,
+        long,
+        IntegrationOptions::of(Form::SecondOrder).with_table(Some([8; 3])),
+    );
     assert!(plain.pixels.iter().any(|p| p[3] > 0.1) && none.pixels.iter().all(|p| *p == [0.0; 4]));
     // For all lengths there is a table, whose diagonal is right.
     // The one value is 0 as it is mapped, and one of an odd number of texels.
     let all = IntegrationOptions::of(Form::SecondOrderPolynomial).with_table(Some([9; 3]));
-    let error = draw(&mut renderer, Order::Two, long, all).compare(&plain).unwrap();
+    let error = draw(&mut renderer, ReconstructionOrder::Two, long, all).compare(&plain).unwrap();
     assert!(error.max < 1e-5, "{:.1e}", error.max);
 }
 
@@ -151,9 +155,9 @@ fn knots_and_values_may_lie_beyond_each_other() {
         for clamp in [true, false] {
             let transfer = knots(lo, hi).with_clamp(clamp);
             let mut renderer = renderer(&grid, &transfer);
-            let want = draw(&mut renderer, Order::Two, Sampling::Voxels, IntegrationOptions::default());
+            let want = draw(&mut renderer, ReconstructionOrder::Two, Sampling::Voxels, IntegrationOptions::default());
             let choice = IntegrationOptions::of(Form::SecondOrderPolynomial).with_table(Some([96; 3]));
-            let got = draw(&mut renderer, Order::Two, Sampling::Voxels, choice).compare(&want).unwrap();
+            let got = draw(&mut renderer, ReconstructionOrder::Two, Sampling::Voxels, choice).compare(&want).unwrap();
             assert!(got.max < 0.1 && got.rmse < 0.02, "{lo} to {hi}, {clamp}: {:.1e} {:.1e}", got.max, got.rmse);
         }
     }
@@ -165,13 +169,13 @@ fn edits_do_not_stall_frames() {
     let grid = grid(wave);
     let mut renderer = renderer(&grid, &transfer());
     let choice = IntegrationOptions::of(Form::SecondOrderPolynomial).with_table(Some([64; 3]));
-    draw(&mut renderer, Order::Two, Sampling::Voxels, choice);
+    draw(&mut renderer, ReconstructionOrder::Two, Sampling::Voxels, choice);
     let other = TransferFunction::new(vec![(0.0, [0.2, 0.9, 0.4])], vec![(90.0, 0.0), (200.0, 1.0)], 0.3).unwrap();
     renderer.set_transfer(&other);
     let first = renderer.render(&view(), &|_| ()).unwrap();
     assert_eq!(renderer.stats().integral, "exact");
     let mut plain = self::renderer(&grid, &other);
-    let want = draw(&mut plain, Order::Two, Sampling::Voxels, IntegrationOptions::default());
+    let want = draw(&mut plain, ReconstructionOrder::Two, Sampling::Voxels, IntegrationOptions::default());
     assert!(first == want);
     let begun = std::time::Instant::now();
     while renderer.stats().integral != "second-order-polynomial" {
@@ -186,11 +190,11 @@ fn what_has_no_table_is_said() {
     let grid = grid(wave);
     let mut renderer = renderer(&grid, &transfer());
     for (order, sampling, form, part) in [
-        (Order::Two, Sampling::Voxels, Form::SecondOrder, "--sampling LENGTH"),
-        (Order::Two, Sampling::Voxels, Form::Volume, "second-order"),
-        (Order::One, Sampling::Voxels, Form::SecondOrderPolynomial, "--reconstruction 2"),
-        (Order::Exact, Sampling::Voxels, Form::Volume, "--integral exact"),
-        (Order::Midpoint, Sampling::Voxels, Form::Volume, "--integral exact"),
+        (ReconstructionOrder::Two, Sampling::Voxels, Form::SecondOrder, "--sampling LENGTH"),
+        (ReconstructionOrder::Two, Sampling::Voxels, Form::Volume, "second-order"),
+        (ReconstructionOrder::One, Sampling::Voxels, Form::SecondOrderPolynomial, "--reconstruction 2"),
+        (ReconstructionOrder::Exact, Sampling::Voxels, Form::Volume, "--integral exact"),
+        (ReconstructionOrder::Midpoint, Sampling::Voxels, Form::Volume, "--integral exact"),
     ] {
         renderer.set_reconstruction(Reconstruction { order, sampling });
         renderer.set_integral(IntegrationOptions::of(form));

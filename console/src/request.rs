@@ -7,7 +7,7 @@ use crate::{camera, input, integral, look, output, parse, progress, variant};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use glam::{DMat4, DVec3};
-use halite::cast::{Order, Reconstruction, Sampling};
+use halite::cast::{Reconstruction, ReconstructionOrder, Sampling};
 use halite::field::{Association, Component, Field, Kind};
 use halite::gpu::DeviceChoice;
 use halite::grid::Grid;
@@ -37,7 +37,7 @@ pub struct Request {
     /// What stands for the field of a regular or rectilinear grid between samples: itself, parabolas, lines, or rectangles
     /// by the middle, the left or the right sample [default: exact]
     #[arg(long, value_name = "ORDER")]
-    reconstruction: Option<Order>,
+    reconstruction: Option<ReconstructionOrder>,
     /// Where such samples are: at faces of voxels and midway, or so many world units apart [default: voxels]
     #[arg(long, value_name = "voxels|LENGTH", value_parser = parse::sampling)]
     sampling: Option<Sampling>,
@@ -342,7 +342,7 @@ impl Request {
         let of_scene = scene.and_then(|s| s.reconstruction).unwrap_or_default();
         let order = self.reconstruction.unwrap_or(of_scene.order);
         let sampling = self.sampling.unwrap_or(of_scene.sampling);
-        if order == Order::Exact && self.sampling.is_some_and(|s| s != Sampling::Voxels) {
+        if order == ReconstructionOrder::Exact && self.sampling.is_some_and(|s| s != Sampling::Voxels) {
             return Err(output::misuse(
                 "--sampling: the exact reconstruction takes no samples; --reconstruction 2 does",
             ));

@@ -1,7 +1,7 @@
 //! The options of the projection engine, as options and in scenes.
 
 use clap::Args;
-use halite::project::{Compositing, Cycles, Fragments, Order, ProjectionOptions, Target, Thickness};
+use halite::project::{CellOrder, Compositing, Cycles, Fragments, ProjectionOptions, Target, Thickness};
 use halite::scene::read;
 use serde::de::DeserializeOwned;
 
@@ -16,8 +16,8 @@ pub struct Variant {
     thickness: Option<Thickness>,
     /// In which sequence cells are drawn: mpvo (right for every pixel), mpvo-convex, mpvonc and xmpvo (as published), depth,
     /// circumsphere (for Delaunay meshes, as exact as f64), or none
-    #[arg(long, value_name = "KIND", value_parser = named::<Order>, help_heading = "Projection engine")]
-    order: Option<Order>,
+    #[arg(long, value_name = "KIND", value_parser = named::<CellOrder>, help_heading = "Projection engine")]
+    order: Option<CellOrder>,
     /// What draws pixels that see cells which hide each other in a circle: walk, or cut (they stay wrong)
     #[arg(long, value_name = "KIND", value_parser = named::<Cycles>, help_heading = "Projection engine")]
     cycles: Option<Cycles>,

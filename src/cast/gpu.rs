@@ -9,7 +9,7 @@ mod frame;
 mod texels;
 
 use super::ray::{self, Frame, Visible, least_light};
-use super::reconstruction::{Order, Reconstruction, Sampling};
+use super::reconstruction::{Reconstruction, ReconstructionOrder, Sampling};
 use super::volume::{BLOCK, Samples};
 use crate::error::Result;
 use crate::gpu::arrays::{self, INVISIBLE};
@@ -288,19 +288,19 @@ fn program(frame: &Frame, are_curved: bool, arrays: &[ShaderArray]) -> String {
         least: least_light(exact.direct) as f32,
     });
     let _ = writeln!(text, "const UNFINISHED = {UNFINISHED:?}f;\nconst SNAP = {SNAP:?}f;");
-    let number = |of: Order| Order::ALL.iter().position(|(_, o)| *o == of).unwrap_or(0);
+    let number = |of: ReconstructionOrder| ReconstructionOrder::ALL.iter().position(|(_, o)| *o == of).unwrap_or(0);
     for (name, of) in [
-        ("EXACT", Order::Exact),
-        ("TWO", Order::Two),
-        ("ONE", Order::One),
-        ("MIDPOINT", Order::Midpoint),
-        ("LEFT", Order::Left),
-        ("RIGHT", Order::Right),
+        ("EXACT", ReconstructionOrder::Exact),
+        ("TWO", ReconstructionOrder::Two),
+        ("ONE", ReconstructionOrder::One),
+        ("MIDPOINT", ReconstructionOrder::Midpoint),
+        ("LEFT", ReconstructionOrder::Left),
+        ("RIGHT", ReconstructionOrder::Right),
         ("ORDER", order),
     ] {
         let _ = writeln!(text, "const {name} = {}u;", number(of));
     }
-    let by_length = order != Order::Exact && matches!(sampling, Sampling::Steps(_));
+    let by_length = order != ReconstructionOrder::Exact && matches!(sampling, Sampling::Steps(_));
     for (name, value) in [
         ("EVEN", volume.even),
         ("HIDES", volume.hidden.is_some()),

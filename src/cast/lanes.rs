@@ -23,7 +23,7 @@ pub(super) mod tests;
 mod walk;
 
 use super::ray::{Frame, Visible, enter, least_light};
-use super::reconstruction::{Order, Reconstruction, Sampling};
+use super::reconstruction::{Reconstruction, ReconstructionOrder, Sampling};
 use super::volume::Volume;
 use crate::field::Normalization;
 use crate::integral::lines::Map;
@@ -73,7 +73,8 @@ impl<'a> Scene<'a> {
     fn new(frame: &'a Frame<'a>, visible: &'a Visible, seen: &'a [bool]) -> Option<Self> {
         let Frame { volume, samples, exact, .. } = *frame;
         let step = match frame.reconstruction {
-            Reconstruction { order: Order::Exact, .. } | Reconstruction { sampling: Sampling::Voxels, .. } => None,
+            Reconstruction { order: ReconstructionOrder::Exact, .. }
+            | Reconstruction { sampling: Sampling::Voxels, .. } => None,
             Reconstruction { sampling: Sampling::Steps(step), .. } => Some(step),
         };
         let uneven = step.is_some() && !volume.even;

@@ -1,7 +1,7 @@
 //! Rays: from voxel to voxel, and what each adds.
 
 use super::lanes;
-use super::reconstruction::{Order, Reconstruction, Sampling};
+use super::reconstruction::{Reconstruction, ReconstructionOrder, Sampling};
 use super::tabulated::Tabulated;
 use super::volume::{Samples, Volume};
 use crate::integral::cubic::{Cubic, Piece, trilinear};
@@ -237,7 +237,7 @@ impl<const N: usize> Caster<'_, N> {
         let mut gathered = Gathered { light: Light::none(), largest: None, steps: 0 };
         let Some((o, d, [t, end])) = enter(self.frame, i, j) else { return gathered };
         if let Reconstruction { order, sampling: Sampling::Steps(step) } = self.frame.reconstruction
-            && order != Order::Exact
+            && order != ReconstructionOrder::Exact
         {
             self.march(&Line { o, d }, [t, end], step, &mut gathered);
             return gathered;
@@ -272,7 +272,7 @@ impl<const N: usize> Caster<'_, N> {
             Cubic::along(&samples.corners(at, k), p.to_array(), q.to_array())
         });
         match self.frame.reconstruction.order {
-            Order::Exact => self.add(&cubics, length, gathered),
+            ReconstructionOrder::Exact => self.add(&cubics, length, gathered),
             order => self.slab(order, &cubics.map(|c| [c.0[0], c.at(0.5), c.0[3]]), length, gathered),
         }
     }
@@ -308,7 +308,7 @@ impl<const N: usize> Caster<'_, N> {
     }
 
     /// Adds what stands for the field between the samples of a slab.
-    fn slab(&self, order: Order, samples: &[[f64; 3]; N], length: f64, gathered: &mut Gathered<N>) {
+    fn slab(&self, order: ReconstructionOrder, samples: &[[f64; 3]; N], length: f64, gathered: &mut Gathered<N>) {
         let parts = order.parts();
         if let (Some(table), Blend::Composite, [samples]) = (&self.frame.table, self.frame.view.blend(), &samples[..]) {
             for part in 0..parts {

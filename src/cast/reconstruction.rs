@@ -9,7 +9,7 @@ use crate::integral::cubic::Cubic;
 
 /// What stands for the field between samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Order {
+pub enum ReconstructionOrder {
     /// The field itself: a cubic in each voxel.
     #[default]
     Exact,
@@ -26,22 +26,22 @@ pub enum Order {
     Right,
 }
 
-impl Order {
+impl ReconstructionOrder {
     /// All orders by the names that options have for them.
-    pub const ALL: [(&'static str, Order); 6] = [
-        ("exact", Order::Exact),
-        ("2", Order::Two),
-        ("1", Order::One),
-        ("0", Order::Midpoint),
-        ("0-left", Order::Left),
-        ("0-right", Order::Right),
+    pub const ALL: [(&'static str, ReconstructionOrder); 6] = [
+        ("exact", ReconstructionOrder::Exact),
+        ("2", ReconstructionOrder::Two),
+        ("1", ReconstructionOrder::One),
+        ("0", ReconstructionOrder::Midpoint),
+        ("0-left", ReconstructionOrder::Left),
+        ("0-right", ReconstructionOrder::Right),
     ];
 
     /// Parts of equal length that a slab has.
     pub(super) fn parts(self) -> usize {
         match self {
-            Order::Exact | Order::Two | Order::Midpoint => 1,
-            Order::One | Order::Left | Order::Right => 2,
+            ReconstructionOrder::Exact | ReconstructionOrder::Two | ReconstructionOrder::Midpoint => 1,
+            ReconstructionOrder::One | ReconstructionOrder::Left | ReconstructionOrder::Right => 2,
         }
     }
 
@@ -49,11 +49,11 @@ impl Order {
     pub(super) fn part(self, part: usize, [front, middle, back]: [f64; 3]) -> Cubic {
         let [a, b] = if part == 0 { [front, middle] } else { [middle, back] };
         match self {
-            Order::Exact | Order::Two => Cubic::parabola([front, middle, back]),
-            Order::One => Cubic([a, a + (b - a) / 3.0, b - (b - a) / 3.0, b]),
-            Order::Midpoint => Cubic::constant(middle),
-            Order::Left => Cubic::constant(a),
-            Order::Right => Cubic::constant(b),
+            ReconstructionOrder::Exact | ReconstructionOrder::Two => Cubic::parabola([front, middle, back]),
+            ReconstructionOrder::One => Cubic([a, a + (b - a) / 3.0, b - (b - a) / 3.0, b]),
+            ReconstructionOrder::Midpoint => Cubic::constant(middle),
+            ReconstructionOrder::Left => Cubic::constant(a),
+            ReconstructionOrder::Right => Cubic::constant(b),
         }
     }
 }
@@ -72,8 +72,8 @@ pub enum Sampling {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Reconstruction {
     /// What stands for it between samples.
-    pub order: Order,
-    /// Where these are; of no account to [`Order::Exact`].
+    pub order: ReconstructionOrder,
+    /// Where these are; of no account to [`ReconstructionOrder::Exact`].
     pub sampling: Sampling,
 }
 
@@ -85,7 +85,7 @@ impl Reconstruction {
     pub(crate) fn check(&self, diagonal: f64) -> Result<()> {
         match self.sampling {
             Sampling::Steps(step)
-                if self.order != Order::Exact && !(step * MOST_STEPS >= diagonal && step.is_finite()) =>
+                if self.order != ReconstructionOrder::Exact && !(step * MOST_STEPS >= diagonal && step.is_finite()) =>
             {
                 Err(Error::Render(format!(
                     "steps of {step} along rays: they are finite, and 1e-7 of the grid's diagonal {diagonal} at least"
@@ -103,21 +103,25 @@ mod tests {
     #[test]
     fn parts_pass_through_their_samples() {
         let samples = [0.3, -0.9, 2.0];
-        let at = |order: Order, u: f64| {
+        let at = |order: ReconstructionOrder, u: f64| {
             let parts = order.parts() as f64;
             let part = ((u * parts) as usize).min(order.parts() - 1);
             order.part(part, samples).at(u * parts - part as f64)
         };
-        for order in [Order::One, Order::Two] {
+        for order in [ReconstructionOrder::One, ReconstructionOrder::Two] {
             for (u, s) in [0.0, 0.5, 1.0].into_iter().zip(samples) {
                 assert!((at(order, u) - s).abs() < 1e-15, "{order:?}");
             }
         }
         let [f, m, b] = samples;
         let (x, y) = (2.0 * f - 4.0 * m + 2.0 * b, -3.0 * f + 4.0 * m - b);
-        assert!((at(Order::Two, 0.3) - (x * 0.09 + y * 0.3 + f)).abs() < 1e-15);
-        assert!((at(Order::One, 0.75) - f64::midpoint(m, b)).abs() < 1e-15);
-        for (order, parts) in [(Order::Midpoint, [m, m]), (Order::Left, [f, m]), (Order::Right, [m, b])] {
+        assert!((at(ReconstructionOrder::Two, 0.3) - (x * 0.09 + y * 0.3 + f)).abs() < 1e-15);
+        assert!((at(ReconstructionOrder::One, 0.75) - f64::midpoint(m, b)).abs() < 1e-15);
+        for (order, parts) in [
+            (ReconstructionOrder::Midpoint, [m, m]),
+            (ReconstructionOrder::Left, [f, m]),
+            (ReconstructionOrder::Right, [m, b]),
+        ] {
             for (u, s) in [0.2, 0.7].into_iter().zip(parts) {
                 assert!((at(order, u) - s).abs() < 1e-15, "{order:?}");
             }

@@ -1,6 +1,6 @@
 //! Tables in the place of integrals: of order 1 over two samples, of order 2 over three.
 
-use super::reconstruction::Order;
+use super::reconstruction::ReconstructionOrder;
 use crate::error::{Error, Result};
 use crate::field::Normalization;
 use crate::integral::{Exact, Form, PreintegratedTable};
@@ -12,7 +12,7 @@ pub(crate) struct Tabulated<'a> {
     map: [f64; 2],
     /// The function over the table's values, for those beyond them.
     exact: &'a Exact<f64>,
-    order: Order,
+    order: ReconstructionOrder,
 }
 
 /// How much shorter than its table's slabs one may be, relative to these.
@@ -23,23 +23,23 @@ const SHORTER: f64 = 1e-5;
 /// # Errors
 /// [`Error::Render`], with what there is, for a `form` that `order` has no samples for; and for a table of one length
 /// where samples are not `even`ly apart.
-pub(crate) fn check(form: Form, order: Order, even: bool) -> Result<()> {
+pub(crate) fn check(form: Form, order: ReconstructionOrder, even: bool) -> Result<()> {
     let name = form.name();
     let what = match (form, order) {
         (Form::Auto | Form::Exact, _) => return Ok(()),
-        (Form::SecondOrder, Order::Two) if !even => format!(
+        (Form::SecondOrder, ReconstructionOrder::Two) if !even => format!(
             "{name}: this table is of slabs of one length, and those from face to face of voxels have any; use --sampling \
              LENGTH, or second-order-polynomial, which serves all lengths"
         ),
-        (Form::SecondOrder | Form::SecondOrderPolynomial, Order::Two) => return Ok(()),
+        (Form::SecondOrder | Form::SecondOrderPolynomial, ReconstructionOrder::Two) => return Ok(()),
         (Form::SecondOrder | Form::SecondOrderPolynomial, _) => {
             format!("{name}: this table is of parabolas through three samples; use --reconstruction 2")
         }
-        (_, Order::One) => return Ok(()),
-        (_, Order::Two) => {
+        (_, ReconstructionOrder::One) => return Ok(()),
+        (_, ReconstructionOrder::Two) => {
             format!("{name}: parabolas are in tables of second order; use second-order or second-order-polynomial")
         }
-        (_, Order::Exact) => format!(
+        (_, ReconstructionOrder::Exact) => format!(
             "{name}: the field of a grid as it is has no table; use --integral exact, or --reconstruction 1 or 2, whose \
              samples have"
         ),
@@ -54,7 +54,7 @@ impl<'a> Tabulated<'a> {
         lookup: &'a PreintegratedTable,
         exact: &'a Exact<f64>,
         [own, of_table]: [Normalization; 2],
-        order: Order,
+        order: ReconstructionOrder,
     ) -> Self {
         let map = [own.half / of_table.half, (own.mid - of_table.mid) / of_table.half];
         Tabulated { lookup, map, exact, order }
@@ -67,7 +67,7 @@ impl<'a> Tabulated<'a> {
         let [scale, shift] = self.map;
         let [front, middle, back] = samples.map(|s| s * scale + shift);
         let samples = match (self.order, part) {
-            (Order::Two, _) => [front, middle, back],
+            (ReconstructionOrder::Two, _) => [front, middle, back],
             (_, 0) => [front, f64::midpoint(front, middle), middle],
             _ => [middle, f64::midpoint(middle, back), back],
         };

@@ -13,7 +13,7 @@ mod primitive;
 mod program;
 mod second;
 
-use super::{Fragments, Order, ProjectionCounts, ProjectionOptions, Target};
+use super::{CellOrder, Fragments, ProjectionCounts, ProjectionOptions, Target};
 use crate::error::{Error, Result};
 use crate::field::Kind;
 use crate::geometry::{TetMesh, Values};
@@ -277,9 +277,9 @@ impl Project {
         // Without neighbours there is depth.
         let by = match options.order {
             // The largest value needs none.
-            _ if is_maximum => Order::None,
+            _ if is_maximum => CellOrder::None,
             order if geometry.is_connected() || order.rule().is_none() => order,
-            _ => Order::Depth,
+            _ => CellOrder::Depth,
         };
         let mut counts = ProjectionCounts { order: by, ..ProjectionCounts::default() };
         let splits = options.fragments != Fragments::Intersected && view.eye().is_some();

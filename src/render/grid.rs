@@ -7,7 +7,7 @@ use super::largest::Largest;
 use super::tables::TableKey;
 use super::{Progress, Renderer, ms};
 use crate::cast::tabulated::{self, Tabulated};
-use crate::cast::{self, Order, Reconstruction, Samples, Sampling, Volume};
+use crate::cast::{self, Reconstruction, ReconstructionOrder, Samples, Sampling, Volume};
 use crate::error::{Error, Result};
 use crate::field::normalization::Chooser;
 use crate::field::{Field, Kind, Normalization};
@@ -83,7 +83,7 @@ impl OnGrid {
             Sampling::Voxels => volume.longest_chord(),
             Sampling::Steps(step) => 2.0 * step,
         };
-        let longest = volume.scale * if how.order == Order::One { slab / 2.0 } else { slab };
+        let longest = volume.scale * if how.order == ReconstructionOrder::One { slab / 2.0 } else { slab };
         Ok(Some(TableKey { exact: own, choice: *choice, longest, on_device: false }))
     }
 
@@ -158,7 +158,7 @@ impl Renderer {
         let field = grid.field.as_mut().ok_or_else(|| missing("field"))?;
         let transfer = self.transfer.as_ref().ok_or_else(|| missing("transfer function"))?;
         let of_two = !transfer.is_of_one_variable();
-        if of_two && reconstruction.order != Order::Exact {
+        if of_two && reconstruction.order != ReconstructionOrder::Exact {
             let what = "reconstructions are of one variable; with a second, or light, use --reconstruction exact";
             return Err(Error::Render(what.into()));
         }

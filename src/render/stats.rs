@@ -1,6 +1,6 @@
 //! What a renderer tells of its work.
 
-use crate::project::Order;
+use crate::project::CellOrder;
 
 /// What a renderer did and how long it took.
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
@@ -60,7 +60,7 @@ pub struct ProjectionStats {
     /// Cells that were drawn, each once, also where it is drawn in parts.
     pub drawn_cells: u64,
     /// What decided the sequence of cells.
-    pub order: Order,
+    pub order: CellOrder,
     /// Finding the cells that are seen and sorting them, in ms; 0 if the camera stood still.
     pub order_ms: f64,
     /// How often cells were sorted: once, or not at all where the order of the frame before holds.

@@ -10,7 +10,7 @@ use halite::gpu::DeviceChoice;
 use halite::integral::options::{Form, IntegrationOptions, Planes, Texels};
 use halite::integral::table::Kind;
 use halite::mesh::{Array, Cells, Mesh, Values, cells::Tetrahedra};
-use halite::project::{Fragments, Order, ProjectionOptions, Target};
+use halite::project::{CellOrder, Fragments, ProjectionOptions, Target};
 use halite::render::{Engine, Renderer};
 use halite::transfer::TransferFunction;
 use halite::view::{Camera, Projection, View};
@@ -201,12 +201,12 @@ fn sorts_and_data(mut renderer: Renderer) {
         println!("  {name}, {count} tetrahedra");
         let mut numeric = None;
         for (sort, order) in [
-            ("by depth (numeric)", Order::Depth),
-            ("MPVO", Order::MpvoConvex),
-            ("XMPVO", Order::Xmpvo),
-            ("mpvo, Halite's own", Order::Mpvo),
-            ("by circumspheres", Order::Circumsphere),
-            ("none", Order::None),
+            ("by depth (numeric)", CellOrder::Depth),
+            ("MPVO", CellOrder::MpvoConvex),
+            ("XMPVO", CellOrder::Xmpvo),
+            ("mpvo, Halite's own", CellOrder::Mpvo),
+            ("by circumspheres", CellOrder::Circumsphere),
+            ("none", CellOrder::None),
         ] {
             let projection = ProjectionOptions::default().with_order(order).with_fragments(Fragments::Interpolated);
             renderer.set_projection(projection);

@@ -15,7 +15,7 @@ use halite::gpu::DeviceChoice;
 use halite::image::{Backdrop, Image};
 use halite::integral::options::{Form, IntegrationOptions, Texels};
 use halite::integral::table::Kind;
-use halite::project::{Fragments, Order, ProjectionOptions, Target, Thickness};
+use halite::project::{CellOrder, Fragments, ProjectionOptions, Target, Thickness};
 use halite::render::Renderer;
 use halite::view::View;
 use halite_console::request::{self, Job, Request};
@@ -124,9 +124,9 @@ fn variants(table: Option<[u32; 3]>) -> Vec<Variant> {
         variant("log-normalised, float", "", interpolated, volume(Kind::LogNormalised, Texels::Float)),
         variant("interpolated, exact", "", interpolated, exact),
         variant("intersected, exact", "", best, exact),
-        variant("by depth", "", best.with_order(Order::Depth), exact),
-        variant("by circumspheres", "", best.with_order(Order::Circumsphere), exact),
-        variant("not sorted", "", best.with_order(Order::None), exact),
+        variant("by depth", "", best.with_order(CellOrder::Depth), exact),
+        variant("by circumspheres", "", best.with_order(CellOrder::Circumsphere), exact),
+        variant("not sorted", "", best.with_order(CellOrder::None), exact),
     ]
 }
 
@@ -222,12 +222,12 @@ fn draw(variant: Variant, frames: u32, renderer: &mut Renderer, view: &View, tru
     renderer.set_integral(variant.integral);
     // Whatever the last variant left: each sorts for itself, and finds the sequence of the mesh if it draws in such.
     let other = match variant.projection.order {
-        Order::MpvoConvex => Order::Mpvonc,
-        Order::Mpvo | Order::Mpvonc | Order::Xmpvo => Order::MpvoConvex,
-        Order::Depth | Order::Circumsphere | Order::None => Order::None,
+        CellOrder::MpvoConvex => CellOrder::Mpvonc,
+        CellOrder::Mpvo | CellOrder::Mpvonc | CellOrder::Xmpvo => CellOrder::MpvoConvex,
+        CellOrder::Depth | CellOrder::Circumsphere | CellOrder::None => CellOrder::None,
     };
     renderer.set_projection(variant.projection.with_order(other).with_fragments(Fragments::Intersected));
-    if variant.projection.order != Order::None {
+    if variant.projection.order != CellOrder::None {
         renderer.render(view, &|_| ())?;
     }
     renderer.set_projection(variant.projection);

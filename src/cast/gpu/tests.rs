@@ -110,11 +110,12 @@ fn limited(random: &mut Random, view: View) -> View {
 }
 
 fn case(random: &mut Random, of: usize) -> Case {
-    let order = Order::ALL[[0, 0, 0, 0, 1, 2, 3, 4, 5][random.below(9)]].1;
-    let (grid, field, ends) = if of == 1 { grid(random, order == Order::Exact) } else { colored(random, of) };
+    let order = ReconstructionOrder::ALL[[0, 0, 0, 0, 1, 2, 3, 4, 5][random.below(9)]].1;
+    let (grid, field, ends) =
+        if of == 1 { grid(random, order == ReconstructionOrder::Exact) } else { colored(random, of) };
     let (transfer, mut view) = (transfer(random, ends), view(random));
     view = limited(random, view);
-    if order == Order::Exact && random.below(4) == 0 {
+    if order == ReconstructionOrder::Exact && random.below(4) == 0 {
         view = view.with_blend(Blend::Maximum);
     }
     let step = random.within(0.01, 0.4);

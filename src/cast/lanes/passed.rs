@@ -4,7 +4,7 @@ use super::Scene;
 use super::corners::{Pairs, STEPS, fetch, fetch_cells};
 use super::march::SLABS;
 use super::walk::LANES;
-use crate::cast::reconstruction::Order;
+use crate::cast::reconstruction::ReconstructionOrder;
 use crate::integral::cubic::{Cubic, trilinear};
 use crate::mesh::with_values;
 use fearless_simd::prelude::*;
@@ -205,24 +205,24 @@ pub(super) fn samples_of<S: Simd>(simd: S, a: [f32x8<S>; 4]) -> [f32x8<S>; 3] {
     [a[0], a[3].mul_add(half, a[2]).mul_add(half, a[1]).mul_add(half, a[0]), (a[0] + a[1]) + (a[2] + a[3])]
 }
 
-/// What stands for the values between three samples in a part of a slab: as [`Order::part`].
+/// What stands for the values between three samples in a part of a slab: as [`ReconstructionOrder::part`].
 #[inline(always)]
 pub(super) fn stands_for<S: Simd>(
     simd: S,
-    order: Order,
+    order: ReconstructionOrder,
     part: usize,
     [front, middle, back]: [f32x8<S>; 3],
 ) -> [f32x8<S>; 4] {
     let zero = f32x8::splat(simd, 0.0);
     let [from, to] = if part == 0 { [front, middle] } else { [middle, back] };
     match order {
-        Order::Exact | Order::Two => {
+        ReconstructionOrder::Exact | ReconstructionOrder::Two => {
             let bend = (front - middle) + (back - middle);
             [front, (back - front) - (bend + bend), bend + bend, zero]
         }
-        Order::One => [from, to - from, zero, zero],
-        Order::Midpoint => [middle, zero, zero, zero],
-        Order::Left => [from, zero, zero, zero],
-        Order::Right => [to, zero, zero, zero],
+        ReconstructionOrder::One => [from, to - from, zero, zero],
+        ReconstructionOrder::Midpoint => [middle, zero, zero, zero],
+        ReconstructionOrder::Left => [from, zero, zero, zero],
+        ReconstructionOrder::Right => [to, zero, zero, zero],
     }
 }

@@ -7,7 +7,7 @@ use super::cut::{Cut, SLOTS};
 use super::march::SLABS;
 use super::passed::{Lanes, Passed, lanes, samples_of, stands_for};
 use super::walk::LANES;
-use crate::cast::reconstruction::Order;
+use crate::cast::reconstruction::ReconstructionOrder;
 use crate::integral::cubic::stretch::{DEEPEST, Stretch};
 use fearless_simd::Simd;
 use fearless_simd::f32x8;
@@ -106,7 +106,7 @@ impl Taken {
             for s in 0..passed.count.min(STEPS) {
                 let cubic = passed.cubic(simd, scene, s);
                 let length = lanes(simd, &passed.length[s]) * scale;
-                if order == Order::Exact {
+                if order == ReconstructionOrder::Exact {
                     self.keep(s, cubic, length);
                     continue;
                 }
@@ -265,7 +265,7 @@ impl Taken {
                 }
                 let cubic = passed.exactly(scene, s, l);
                 match order {
-                    Order::Exact => cubic,
+                    ReconstructionOrder::Exact => cubic,
                     order => order.part(slot % parts, [cubic.0[0], cubic.at(0.5), cubic.0[3]]),
                 }
             };

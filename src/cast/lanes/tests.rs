@@ -1,7 +1,7 @@
 //! Lanes against f64, ray by ray: pictures of random grids, by random functions, from anywhere.
 
 use super::super::ray::{Frame, Visible, one_by_one};
-use super::super::{Order, Reconstruction, Sampling};
+use super::super::{Reconstruction, ReconstructionOrder, Sampling};
 use super::*;
 use crate::cast::Samples;
 use crate::field::{Association, Component, Field};
@@ -202,7 +202,7 @@ fn bits_do_not_depend_on_threads() {
         let mut random = Random(seed * 104_729 + 7);
         let (grid, field, ends) = grid(&mut random, true);
         let (transfer, view) = (transfer(&mut random, ends), view(&mut random));
-        let order = Order::ALL[random.below(Order::ALL.len())].1;
+        let order = ReconstructionOrder::ALL[random.below(ReconstructionOrder::ALL.len())].1;
         let sampling = if seed % 3 == 0 { Sampling::Steps(0.07) } else { Sampling::Voxels };
         let how = Reconstruction { order, sampling };
         let bits = pools.each_ref().map(|pool| {
@@ -224,9 +224,9 @@ fn lanes_draw_what_f64_draws() {
     let (mut shown, mut wrong) = (0, vec![]);
     for seed in 0..400 {
         let mut random = Random(seed * 7919 + 1);
-        let order = Order::ALL[[0, 0, 0, 1, 2, 3, 4, 5][random.below(8)]].1;
+        let order = ReconstructionOrder::ALL[[0, 0, 0, 1, 2, 3, 4, 5][random.below(8)]].1;
         // A sample on a face of a plateau is at once on both sides of a step there, by a rounding.
-        let (grid, field, ends) = grid(&mut random, order == Order::Exact);
+        let (grid, field, ends) = grid(&mut random, order == ReconstructionOrder::Exact);
         let (transfer, view) = (transfer(&mut random, ends), view(&mut random));
         let step = random.within(0.01, 0.4);
         // The middle of a grid may be a face of cells, and then in both.

@@ -10,7 +10,7 @@ use crate::gpu::sort::Sorter;
 use crate::order::PART;
 use crate::order::depth::{self, HIDDEN};
 use crate::order::mpvo::{Rule, Sequence};
-use crate::project::Order;
+use crate::project::CellOrder;
 use crate::view::View;
 use rayon::prelude::*;
 use wgpu::BufferUsages as Usage;
@@ -21,7 +21,7 @@ const MOST_KEYS: u64 = 1 << 24;
 /// How cells are put in sequence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Sequencing {
-    pub(super) by: Order,
+    pub(super) by: CellOrder,
     /// Whether cells around the eye are drawn in parts.
     pub(super) splits: bool,
     /// Whether cells are drawn that the function shows nothing of.
@@ -90,7 +90,7 @@ impl Project {
             chunks,
         };
         // Cells in parts are sorted on the host, which can make several entries of one, and spheres in f64.
-        if self.sorts && !splits && by == Order::Depth && Sorter::fits(&self.gpu, cells) {
+        if self.sorts && !splits && by == CellOrder::Depth && Sorter::fits(&self.gpu, cells) {
             if self.sorter.is_none() {
                 self.sorter = Some(Sorter::new(&self.gpu, HIDDEN)?);
             }
@@ -100,12 +100,12 @@ impl Project {
             return Ok(ordered(entries, entries, usize::MAX, vec![order]));
         }
         let mut keys = self.keys(frame, cells)?;
-        if by == Order::Circumsphere {
+        if by == CellOrder::Circumsphere {
             keys = circumsphere::ranked(geometry, seen, &keys);
         }
         let order = match self.sequence.as_ref().filter(|_| by.rule().is_some()) {
             Some(sequence) => sequence.cells.order(&keys),
-            None => depth::order(&keys, by != Order::None),
+            None => depth::order(&keys, by != CellOrder::None),
         };
         let order = order.entries;
         let cells = keys.into_par_iter().filter(|&key| key != HIDDEN).count();

@@ -9,7 +9,7 @@ use crate::mesh::generate;
 use crate::order::MOST_PARTS;
 use crate::order::depth::{self, HIDDEN};
 use crate::project::gpu::frame::{Limits, ViewUniforms};
-use crate::project::{Compositing, Order};
+use crate::project::{CellOrder, Compositing};
 use crate::render::{Engine, Renderer};
 use crate::transfer::{Emission, TransferFunction};
 use crate::view::{Camera, ClippingPlane, Projection, View};
@@ -179,7 +179,7 @@ fn pictures_do_not_depend_on_who_sorts() {
     ];
     let mut drawn = vec![];
     let (mut walk, _) = prepared(Engine::Traverse, DeviceChoice::Cpu, 8, [48, 40]);
-    for order in [Order::Depth, Order::Circumsphere, Order::Mpvo] {
+    for order in [CellOrder::Depth, CellOrder::Circumsphere, CellOrder::Mpvo] {
         renderer.set_projection(ProjectionOptions { order, ..ProjectionOptions::default() });
         for (i, view) in views.iter().enumerate() {
             let [host, device] = [false, true].map(|on_device| {
@@ -189,7 +189,7 @@ fn pictures_do_not_depend_on_who_sorts() {
             });
             assert!(host.0 == device.0, "{order:?}, view {i}: {:e}", host.0.compare(&device.0).unwrap().max);
             // The order of the mesh is right for every pixel: nothing is taken for hidden that the walk finds.
-            if order == Order::Mpvo {
+            if order == CellOrder::Mpvo {
                 let error = host.0.compare(&walk.render(view, &|_| ()).unwrap()).unwrap().max;
                 assert!(error < 2e-5, "view {i}: {error:e} from the walk");
             }
@@ -213,7 +213,7 @@ fn orders_of_several_buffers_are_one() {
     let everything =
         TransferFunction::new(vec![(-1.0, [1.0, 0.5, 0.0]), (1.0, [0.0, 0.5, 1.0])], vec![(-1.0, 9.0)], 1.0);
     renderer.set_transfer(&everything.unwrap());
-    for order in [Order::Mpvo, Order::Depth] {
+    for order in [CellOrder::Mpvo, CellOrder::Depth] {
         renderer.set_projection(ProjectionOptions { order, ..ProjectionOptions::default() });
         let one = renderer.render(&view, &|_| ()).unwrap();
         let project = renderer.backend().project().unwrap();

@@ -9,7 +9,7 @@ use halite::integral::options::IntegrationOptions;
 use halite::mesh::faces::Faces;
 use halite::order::check::{self, Verdict};
 use halite::order::mpvo::{Mpvo, Rule, Sequence};
-use halite::project::{Cycles, Order, ProjectionOptions};
+use halite::project::{CellOrder, Cycles, ProjectionOptions};
 use halite::render::{Engine, Renderer};
 use halite::scene::Scene;
 use halite::view::View;
@@ -19,12 +19,12 @@ use serde_json::{Value, json};
 use std::path::Path;
 
 /// The orders: the rule that the checker asks, and what draws.
-const ORDERS: [(&str, &str, Rule, Order); 5] = [
-    ("numeric", "by the distances of centres", Rule::Depth, Order::Depth),
-    ("MPVO", "Williams 1992", Rule::Convex, Order::MpvoConvex),
-    ("MPVONC", "Williams 1992", Rule::Nonconvex, Order::Mpvonc),
-    ("XMPVO", "Silva, Mitchell & Williams 1998", Rule::Xmpvo, Order::Xmpvo),
-    ("mpvo", "Halite's", Rule::Mpvo, Order::Mpvo),
+const ORDERS: [(&str, &str, Rule, CellOrder); 5] = [
+    ("numeric", "by the distances of centres", Rule::Depth, CellOrder::Depth),
+    ("MPVO", "Williams 1992", Rule::Convex, CellOrder::MpvoConvex),
+    ("MPVONC", "Williams 1992", Rule::Nonconvex, CellOrder::Mpvonc),
+    ("XMPVO", "Silva, Mitchell & Williams 1998", Rule::Xmpvo, CellOrder::Xmpvo),
+    ("mpvo", "Halite's", Rule::Mpvo, CellOrder::Mpvo),
 ];
 
 /// Frames in a second with numeric, MPVO and XMPVO sorting, by what the names of files begin with, on two graphics cards: Guthe et

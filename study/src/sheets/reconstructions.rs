@@ -6,7 +6,7 @@ mod signal;
 
 use super::Options;
 use anyhow::{Context, Result, bail};
-use halite::cast::{Order, Sampling};
+use halite::cast::{ReconstructionOrder, Sampling};
 use halite::field::{Association, Field};
 use halite::grid::Grid;
 use halite::image::Backdrop;
@@ -26,10 +26,10 @@ const RAYS: usize = 500;
 const LINES: usize = 2000;
 
 /// Orders, the figures where the authors show them, and how far they are off there.
-const ORDERS: [(&str, Order, &str, f64); 3] = [
-    ("order 0", Order::Midpoint, "figure 1", 0.154_418),
-    ("order 1", Order::One, "figure 2", 0.044_494),
-    ("order 2", Order::Two, "figure 4", 0.006_220),
+const ORDERS: [(&str, ReconstructionOrder, &str, f64); 3] = [
+    ("order 0", ReconstructionOrder::Midpoint, "figure 1", 0.154_418),
+    ("order 1", ReconstructionOrder::One, "figure 2", 0.044_494),
+    ("order 2", ReconstructionOrder::Two, "figure 4", 0.006_220),
 ];
 
 /// Names of volumes in which the authors' figures 5 are, how long their lines are in voxels, and how far orders 1 and 2 are off.
@@ -137,8 +137,14 @@ fn semi_random(plots: &mut Vec<Plot>, text: &mut String) -> Vec<Value> {
             "order": name, "figure": figure, "deviation": own, "composed": behind, "published": theirs, "rays": RAYS,
         }));
     }
-    plots.push(Plot::new("figure 3: order 1 behind a function".into(), &shown, Order::One, Sampling::Voxels, tau));
-    plots.push(Plot::new("the same of order 2".into(), &shown, Order::Two, Sampling::Voxels, tau));
+    plots.push(Plot::new(
+        "figure 3: order 1 behind a function".into(),
+        &shown,
+        ReconstructionOrder::One,
+        Sampling::Voxels,
+        tau,
+    ));
+    plots.push(Plot::new("the same of order 2".into(), &shown, ReconstructionOrder::Two, Sampling::Voxels, tau));
     rows
 }
 
@@ -155,7 +161,7 @@ fn steps(volumes: &[Volume], plots: &mut Vec<Plot>, text: &mut String) -> Vec<Va
             let sampling = Sampling::Steps(step);
             let all: f64 = lines.iter().map(signal::Line::end).sum();
             let mean = |order| lines.iter().map(|l| l.deviation(order, sampling, |s| s)).sum::<f64>() / all * length;
-            let [first, second] = [Order::One, Order::Two].map(mean);
+            let [first, second] = [ReconstructionOrder::One, ReconstructionOrder::Two].map(mean);
             let [crossed, slabs] = lines.iter().fold([0, 0], |[a, b], l| {
                 let [c, d] = l.crossed(sampling);
                 [a + c, b + d]
@@ -176,9 +182,10 @@ fn steps(volumes: &[Volume], plots: &mut Vec<Plot>, text: &mut String) -> Vec<Va
         }
         if known.is_some() {
             // The line that the orders differ on most tells most of a figure.
-            let differs = |l: &&signal::Line| l.deviation(Order::One, Sampling::Steps(1.0), |s| s) / l.end();
+            let differs =
+                |l: &&signal::Line| l.deviation(ReconstructionOrder::One, Sampling::Steps(1.0), |s| s) / l.end();
             let most = lines.iter().max_by(|a, b| differs(a).total_cmp(&differs(b)));
-            for (order, name) in [(Order::One, "order 1"), (Order::Two, "order 2")] {
+            for (order, name) in [(ReconstructionOrder::One, "order 1"), (ReconstructionOrder::Two, "order 2")] {
                 let caption = format!("figure 5: {}, {name}", volume.label());
                 plots.extend(most.map(|line| Plot::new(caption, line, order, Sampling::Steps(1.0), |s| s)));
             }

@@ -2,7 +2,7 @@
 
 use super::Volume;
 use anyhow::Result;
-use halite::cast::{Order, Reconstruction, Sampling};
+use halite::cast::{Reconstruction, ReconstructionOrder, Sampling};
 use halite::gpu::DeviceChoice;
 use halite::gpu::construct::Constructor;
 use halite::image::Image;
@@ -25,13 +25,25 @@ const ITERATIONS: [(u32, [f64; 2]); 6] = [
 ];
 
 /// Of the three pictures of a figure the order, and the voxels from sample to sample.
-type Parts = [(Order, f64); 3];
+type Parts = [(ReconstructionOrder, f64); 3];
 
 /// Names of volumes, and the figures that they are in.
 const FIGURES: [(&str, &str, Parts); 3] = [
-    ("neghip", "figure 7", [(Order::One, 2.0), (Order::One, 1.0), (Order::Two, 2.0)]),
-    ("fuel", "figure 8", [(Order::One, 2.0), (Order::One, 1.0), (Order::Two, 2.0)]),
-    ("bucky", "figure 9", [(Order::One, 4.0), (Order::One, 1.0), (Order::Two, 4.0)]),
+    (
+        "neghip",
+        "figure 7",
+        [(ReconstructionOrder::One, 2.0), (ReconstructionOrder::One, 1.0), (ReconstructionOrder::Two, 2.0)],
+    ),
+    (
+        "fuel",
+        "figure 8",
+        [(ReconstructionOrder::One, 2.0), (ReconstructionOrder::One, 1.0), (ReconstructionOrder::Two, 2.0)],
+    ),
+    (
+        "bucky",
+        "figure 9",
+        [(ReconstructionOrder::One, 4.0), (ReconstructionOrder::One, 1.0), (ReconstructionOrder::Two, 4.0)],
+    ),
 ];
 
 /// A picture, and what is said of it.
@@ -80,7 +92,7 @@ pub(super) fn draw(
         let truth = reconstructed(
             &mut renderer,
             &view,
-            Order::Exact,
+            ReconstructionOrder::Exact,
             Sampling::Voxels,
             IntegrationOptions::default(),
             frames,
@@ -101,7 +113,7 @@ pub(super) fn draw(
 fn reconstructed(
     renderer: &mut Renderer,
     view: &View,
-    order: Order,
+    order: ReconstructionOrder,
     sampling: Sampling,
     choice: IntegrationOptions,
     frames: u32,
@@ -133,14 +145,14 @@ struct Studio<'a> {
 }
 
 impl Studio<'_> {
-    fn draw(&mut self, order: Order, sampling: Sampling, choice: IntegrationOptions) -> Result<Drawn> {
+    fn draw(&mut self, order: ReconstructionOrder, sampling: Sampling, choice: IntegrationOptions) -> Result<Drawn> {
         reconstructed(self.renderer, &self.view, order, sampling, choice, self.frames, Some(self.truth))
     }
 
     /// Orders 1 and 2 with samples at the faces of voxels.
     fn by_voxels(&mut self, all: &mut Pictures) -> Result<()> {
-        let first = self.draw(Order::One, Sampling::Voxels, IntegrationOptions::default())?;
-        let second = self.draw(Order::Two, Sampling::Voxels, IntegrationOptions::default())?;
+        let first = self.draw(ReconstructionOrder::One, Sampling::Voxels, IntegrationOptions::default())?;
+        let second = self.draw(ReconstructionOrder::Two, Sampling::Voxels, IntegrationOptions::default())?;
         let ratio = first.rmse / second.rmse;
         if all.voxels.is_empty() {
             all.text += "pictures, samples at faces of voxels      rmse of order 1, of order 2, ratio, ms, ms\n";
@@ -169,7 +181,7 @@ impl Studio<'_> {
         };
         let mut drawn = vec![];
         for (iterations, theirs) in ITERATIONS {
-            drawn.push((iterations, theirs, self.draw(Order::Two, sampling, choice(iterations))?));
+            drawn.push((iterations, theirs, self.draw(ReconstructionOrder::Two, sampling, choice(iterations))?));
         }
         let normal = [0, 1, 2, 3].map(|k| self.volume.field.normal(k));
         let device = Constructor::open(device, &self.volume.scene.transfer, &normal, 1.0)?;
@@ -202,7 +214,7 @@ impl Studio<'_> {
         if let Some(iterations) = agree {
             all.text += &format!("  pictures agree within a byte's step from {iterations} steps on\n");
         }
-        let own = self.draw(Order::Two, sampling, IntegrationOptions::of(Form::SecondOrderPolynomial))?;
+        let own = self.draw(ReconstructionOrder::Two, sampling, IntegrationOptions::of(Form::SecondOrderPolynomial))?;
         let seconds = own.table_ms * 1e-3;
         all.text += &format!("  of all lengths, 64^3, degree 2: {seconds:>16.3} s, rmse {:.1e}\n", own.rmse);
         all.tables
@@ -226,7 +238,7 @@ impl Studio<'_> {
         for (letter, (order, voxels)) in ["a", "b", "c"].into_iter().zip(parts) {
             let sampling = Sampling::Steps(voxels * self.volume.samples.width());
             let (number, table, bits) = match order {
-                Order::One => {
+                ReconstructionOrder::One => {
                     let form = IntegrationOptions::of(Form::Volume)
                         .with_lengths(Kind::LogNormalised)
                         .with_table(Some([256, 256, 16]));

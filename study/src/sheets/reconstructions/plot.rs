@@ -6,7 +6,7 @@ use crate::sheets::Sheet;
 use embedded_graphics::pixelcolor::Rgb888;
 use embedded_graphics::prelude::{Drawable, Point, Primitive, RgbColor, WebColors};
 use embedded_graphics::primitives::{Line as Stroke, PrimitiveStyle};
-use halite::cast::{Order, Sampling};
+use halite::cast::{ReconstructionOrder, Sampling};
 use halite::image::Image;
 
 /// Pixels of a plot.
@@ -29,7 +29,13 @@ pub(super) struct Plot {
 }
 
 impl Plot {
-    pub(super) fn new(caption: String, line: &Line, order: Order, sampling: Sampling, of: impl Fn(f64) -> f64) -> Self {
+    pub(super) fn new(
+        caption: String,
+        line: &Line,
+        order: ReconstructionOrder,
+        sampling: Sampling,
+        of: impl Fn(f64) -> f64,
+    ) -> Self {
         let rebuilt = line.rebuilt(order, sampling).into_iter().map(|[t, s]| [t, of(s)]).collect();
         let at = |t: f64| [t, of(line.at(t))];
         let field = (0..=1000).map(|i| at(line.end() * f64::from(i) / 1000.0)).collect();

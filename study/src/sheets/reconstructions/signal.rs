@@ -1,7 +1,7 @@
 //! A trilinear field along straight lines, and what stands for it between samples: by itself, without the engine that is
 //! studied.
 
-use halite::cast::{Order, Sampling};
+use halite::cast::{ReconstructionOrder, Sampling};
 
 /// A field on a grid, from 0 to 1.
 pub(super) struct Samples {
@@ -90,21 +90,23 @@ impl Samples {
 }
 
 /// What stands for the field at `u` of a slab with these samples.
-fn rebuilt(order: Order, [f, m, b]: [f64; 3], u: f64) -> f64 {
+fn rebuilt(order: ReconstructionOrder, [f, m, b]: [f64; 3], u: f64) -> f64 {
     let (first, second) = (u < 0.5, (u * 2.0).fract());
     match order {
-        Order::Two | Order::Exact => ((2.0 * f - 4.0 * m + 2.0 * b) * u - 3.0 * f + 4.0 * m - b) * u + f,
-        Order::One if first => f + (m - f) * second,
-        Order::One => m + (b - m) * (2.0 * u - 1.0),
-        Order::Midpoint => m,
-        Order::Left => {
+        ReconstructionOrder::Two | ReconstructionOrder::Exact => {
+            ((2.0 * f - 4.0 * m + 2.0 * b) * u - 3.0 * f + 4.0 * m - b) * u + f
+        }
+        ReconstructionOrder::One if first => f + (m - f) * second,
+        ReconstructionOrder::One => m + (b - m) * (2.0 * u - 1.0),
+        ReconstructionOrder::Midpoint => m,
+        ReconstructionOrder::Left => {
             if first {
                 f
             } else {
                 m
             }
         }
-        Order::Right => {
+        ReconstructionOrder::Right => {
             if first {
                 m
             } else {
@@ -137,7 +139,7 @@ impl Line<'_> {
     }
 
     /// What stands for the field, as points (t, value) at equal distances in each slab.
-    pub(super) fn rebuilt(&self, order: Order, sampling: Sampling) -> Vec<[f64; 2]> {
+    pub(super) fn rebuilt(&self, order: ReconstructionOrder, sampling: Sampling) -> Vec<[f64; 2]> {
         let mut points = vec![];
         for [a, b] in self.slabs(sampling) {
             let samples = [a, f64::midpoint(a, b), b].map(|t| self.at(t));
@@ -148,7 +150,7 @@ impl Line<'_> {
     }
 
     /// The integral of how far that is from the field, with both behind a function.
-    pub(super) fn deviation(&self, order: Order, sampling: Sampling, of: impl Fn(f64) -> f64) -> f64 {
+    pub(super) fn deviation(&self, order: ReconstructionOrder, sampling: Sampling, of: impl Fn(f64) -> f64) -> f64 {
         let slabs = self.slabs(sampling);
         let points = self.rebuilt(order, sampling);
         let width = |i: usize| (slabs[i / DENSE][1] - slabs[i / DENSE][0]) / DENSE as f64;
@@ -203,7 +205,9 @@ mod tests {
         let mut sums = [0.0; 3];
         for _ in 0..200 {
             let line = samples.random_line(&mut random);
-            for (sum, order) in sums.iter_mut().zip([Order::Midpoint, Order::One, Order::Two]) {
+            for (sum, order) in
+                sums.iter_mut().zip([ReconstructionOrder::Midpoint, ReconstructionOrder::One, ReconstructionOrder::Two])
+            {
                 *sum += line.deviation(order, Sampling::Voxels, |s| s);
             }
         }
