@@ -131,6 +131,11 @@ impl TetMesh {
         self.left_handed.len() == self.cells.len().div_ceil(64)
     }
 
+    /// Whether it is known that no two points of the mesh share a position.
+    pub(crate) fn is_apart(&self) -> bool {
+        self.is_connected() && !self.welded
+    }
+
     /// Whether the corners of a cell, of a mesh whose cells have neighbours, are a left-handed system.
     #[inline(always)]
     pub(crate) fn is_left_handed(&self, cell: usize) -> bool {

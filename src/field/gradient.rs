@@ -25,8 +25,20 @@ pub struct Gradient {
     range: [f64; 2],
 }
 
-/// Points that one task sums up for: every task looks at all tetrahedra, so that few are best.
+/// By what share of its terms a determinant may be off.
+const DOUBT: f64 = 1e-14;
+
+/// Points that one task sums up for, at least: cells between those of two tasks are computed twice.
 const FEWEST: usize = 1 << 13;
+
+/// Cells of which it is known where their points are, so that tasks pass over what is not theirs.
+const TOGETHER: usize = 1 << 10;
+
+/// A sum of gradients times volumes, and of volumes.
+type Sum = [f64; 4];
+
+/// Nothing yet: its volume is −0, which no sum is.
+const NONE: Sum = [0.0, 0.0, 0.0, -0.0];
 
 impl Gradient {
     /// The gradient of `field` on `tetrahedra`, whose corners index into `points`: see [`Tetrahedra::points`]. On the
@@ -36,6 +48,11 @@ impl Gradient {
     /// [`Error::Field`] if the field is one of cells, or not of one component, or does not fit the points;
     /// [`Error::NoMemory`].
     pub fn new(points: &[DVec3], tetrahedra: &Tetrahedra, field: &Field) -> Result<Self> {
+        Self::of(points, tetrahedra, field, false)
+    }
+
+    /// The same; no two points that cells use share a position, if they are told to be `apart`.
+    pub(crate) fn of(points: &[DVec3], tetrahedra: &Tetrahedra, field: &Field, apart: bool) -> Result<Self> {
         if field.association() == Association::Cell {
             return Err(Error::Field(
                 "values of cells have no gradient, as they are constant inside; choose an array of points".into(),
@@ -48,40 +65,23 @@ impl Gradient {
         if own + tetrahedra.added.len() != all {
             return Err(Error::Field(format!("the field has {own} values for {all} points")));
         }
-        let added = tetrahedra.added_values(1, |i| field.value(i));
-        let value = |p: u32| added.get((p as usize).wrapping_sub(own)).map_or_else(|| field.value(p as usize), |v| *v);
-        let same = same(points, &value);
-        let same = |p: u32| same.as_ref().map_or(p, |s| s[p as usize]);
-        let mut vectors = memory::filled("the gradient", DVec3::ZERO, all)?;
+        let values = tetrahedra.values(field.values(), 1);
+        let same = if apart { None } else { same(points, &values) };
         // Neither lengths nor differences of values may leave the range of f64 in a product of three.
         let normal = field.normal(0);
         let scale = 1.0 / extent(points).max(f64::MIN_POSITIVE * 4.0);
-        let summer = Summer { points, scale, inverse: 1.0 / normal.half };
-        let tasks = rayon::current_num_threads().min(all / FEWEST + 1);
-        let share = all.div_ceil(tasks).max(1);
-        vectors.par_chunks_mut(share).enumerate().for_each(|(i, vectors)| {
-            let first = (i * share) as u32;
-            summer.sum(&tetrahedra.corners, &value, &same, first, vectors);
-        });
-        let size = normal.half * scale;
-        vectors.par_iter_mut().for_each(|v| *v *= size);
-        let copies: Vec<(usize, DVec3)> = (0..all as u32)
-            .into_par_iter()
-            .filter(|&p| same(p) != p)
-            .map(|p| (p as usize, vectors[same(p) as usize]))
-            .collect();
-        copies.into_iter().for_each(|(p, v)| vectors[p] = v);
-        let none = || [f64::INFINITY, f64::NEG_INFINITY];
-        let used = |[lo, hi]: [f64; 2], c: &[u32; 4]| {
-            if c.iter().all(|&p| value(p).is_finite()) {
-                let lengths = c.map(|p| length(vectors[p as usize]));
-                lengths.iter().fold([lo, hi], |[lo, hi], l| [lo.min(*l), hi.max(*l)])
-            } else {
-                [lo, hi]
-            }
+        let summer = Summer { points, values: &values, scale, inverse: 1.0 / normal.half, size: normal.half * scale };
+        let mut vectors = memory::filled("the gradient", DVec3::ZERO, all)?;
+        let corners = &tetrahedra.corners;
+        let range = match &same {
+            None => summer.all(corners, &|p| p, &mut vectors),
+            Some(same) => summer.all(corners, &|p| same[p as usize], &mut vectors),
         };
-        let range = tetrahedra.corners.par_iter().fold(none, used);
-        let range = range.reduce(none, |a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+        if let Some(same) = same {
+            let firsts = (0..all).into_par_iter().filter(|&p| same[p] as usize != p);
+            let copies: Vec<(usize, DVec3)> = firsts.map(|p| (p, vectors[same[p] as usize])).collect();
+            copies.into_iter().for_each(|(p, v)| vectors[p] = v);
+        }
         Ok(Gradient { vectors, range: if range[0] <= range[1] { range } else { [0.0; 2] } })
     }
 
@@ -108,14 +108,15 @@ impl Gradient {
 
 /// The length of a vector, also where its square leaves the range of f64.
 pub(crate) fn length(v: DVec3) -> f64 {
-    v.x.hypot(v.y).hypot(v.z)
+    let square = v.length_squared();
+    if (1e-280..1e280).contains(&square) { square.sqrt() } else { v.x.hypot(v.y).hypot(v.z) }
 }
 
 /// For each point the first of those at its position that have its value; none if no two points share a position.
-fn same(points: &[DVec3], value: &(impl Fn(u32) -> f64 + Sync)) -> Option<Vec<u32>> {
+fn same(points: &[DVec3], values: &[f64]) -> Option<Vec<u32>> {
     let mut same = weld(points)?;
     // −0 + 0 = 0, so that both zeros are one value.
-    let bits = |p: u32| (value(p) + 0.0).to_bits();
+    let bits = |p: u32| (values[p as usize] + 0.0).to_bits();
     let mut shared: Vec<u32> = (0..points.len() as u32).into_par_iter().filter(|&p| same[p as usize] != p).collect();
     let firsts: Vec<u32> = shared.iter().map(|&p| same[p as usize]).collect();
     shared.extend(firsts);
@@ -143,71 +144,115 @@ fn extent(points: &[DVec3]) -> f64 {
 /// Adds up the gradients around points.
 struct Summer<'a> {
     points: &'a [DVec3],
+    values: &'a [f64],
     /// What lengths are multiplied by.
     scale: f64,
     /// What values are multiplied by.
     inverse: f64,
+    /// What gradients in these units are multiplied by.
+    size: f64,
 }
 
 impl Summer<'_> {
-    /// The means at the points from `first` on, one for each of `vectors`, in units of value and length as multiplied.
-    fn sum(
-        &self,
-        corners: &[[u32; 4]],
-        value: &impl Fn(u32) -> f64,
-        same: &impl Fn(u32) -> u32,
-        first: u32,
-        vectors: &mut [DVec3],
-    ) {
-        let mut weights = vec![0.0; vectors.len()];
+    /// Finds the means at all points, and the least and the greatest length where anything is drawn. What stands for a point is
+    /// `same` of it.
+    ///
+    /// A task has some of the points, and adds up for each of them in the sequence of the cells, whatever the tasks are.
+    fn all(&self, corners: &[[u32; 4]], same: &(impl Fn(u32) -> u32 + Sync), vectors: &mut [DVec3]) -> [f64; 2] {
+        let points = vectors.len();
+        let hull = |some: &[[u32; 4]]| {
+            let join = |[lo, hi]: [u32; 2], p: u32| [lo.min(p), hi.max(p)];
+            some.iter().flatten().map(|&p| same(p)).fold([u32::MAX, 0], join)
+        };
+        let hulls: Vec<[u32; 2]> = corners.par_chunks(TOGETHER).with_min_len(16).map(hull).collect();
+        let tasks = rayon::current_num_threads().min(points / FEWEST + 1);
+        let share = points.div_ceil(tasks).max(1);
+        let none = || [f64::INFINITY, f64::NEG_INFINITY];
+        let ranges = vectors.par_chunks_mut(share).enumerate().map(|(i, vectors)| {
+            let (first, end) = (i * share, i * share + vectors.len());
+            let mut sums = vec![NONE; vectors.len()];
+            for (some, [low, high]) in corners.chunks(TOGETHER).zip(&hulls) {
+                if (*low as usize) < end && *high as usize >= first {
+                    self.add(some, same, first as u32, &mut sums);
+                }
+            }
+            self.means(&sums, vectors)
+        });
+        ranges.reduce(none, |a, b| [a[0].min(b[0]), a[1].max(b[1])])
+    }
+
+    /// Adds what cells have to the sums of the points from `first` on.
+    fn add(&self, corners: &[[u32; 4]], same: &impl Fn(u32) -> u32, first: u32, sums: &mut [Sum]) {
         for corners in corners {
             let at = corners.map(|p| same(p).wrapping_sub(first) as usize);
-            if at.iter().all(|&i| i >= vectors.len()) {
+            if at.iter().all(|&i| i >= sums.len()) {
                 continue;
             }
-            let Some((vector, weight)) = self.of(corners, value) else { continue };
+            let Some(cell) = self.of(corners) else { continue };
             for i in at {
-                if i < vectors.len() {
-                    vectors[i] += vector;
-                    weights[i] += weight;
+                if let Some(sum) = sums.get_mut(i) {
+                    (0..4).for_each(|k| sum[k] += cell[k]);
                 }
             }
         }
-        for (vector, weight) in vectors.iter_mut().zip(weights) {
-            *vector = if weight > 0.0 { *vector / weight } else { DVec3::ZERO };
-        }
     }
 
-    /// Gradient times volume, and volume, of one tetrahedron, both times 6; none if it is not drawn or has no volume.
-    fn of(&self, corners: &[u32; 4], value: &impl Fn(u32) -> f64) -> Option<(DVec3, f64)> {
-        let values = corners.map(|p| value(p) * self.inverse);
-        let points = corners.map(|p| self.points[p as usize]);
-        if !values.iter().all(|v| v.is_finite()) || !points.iter().all(|p| p.is_finite()) {
-            return None;
+    /// Makes means of sums, and says how long the least and the greatest are where anything is drawn.
+    fn means(&self, sums: &[Sum], vectors: &mut [DVec3]) -> [f64; 2] {
+        let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+        for ([x, y, z, weight], to) in sums.iter().zip(vectors) {
+            if *weight > 0.0 {
+                *to = DVec3::new(*x, *y, *z) / *weight * self.size;
+            }
+            if weight.is_sign_positive() {
+                let length = length(*to);
+                range = [range[0].min(length), range[1].max(length)];
+            }
         }
+        range
+    }
+
+    /// Gradient times volume, and volume, of one tetrahedron, all times 6, 0 without a volume; none if it is not drawn.
+    #[inline(always)]
+    fn of(&self, corners: &[u32; 4]) -> Option<Sum> {
+        let values = corners.map(|p| self.values[p as usize] * self.inverse);
+        let points = corners.map(|p| self.points[p as usize]);
         let [a, b, c] = [1, 2, 3].map(|k| (points[k] - points[0]) * self.scale);
         let [across, beside, over] = [b.cross(c), c.cross(a), a.cross(b)];
         let mut det = a.dot(across);
-        // The sign of what is flat but for rounding is that of the points as they are.
-        let doubt = 1e-14
+        // Not finite if anything is not.
+        if !(det + values[0] + values[1] + values[2] + values[3]).is_finite() {
+            return None;
+        }
+        // The sign of what is flat but for rounding is that of the points as they are: far from that, by six products of lengths.
+        let products = a.length_squared() * b.length_squared() * c.length_squared();
+        if det * det <= 36.0 * DOUBT * DOUBT * products {
+            det = self.sure(&points, [a, b, c], det);
+        }
+        let [d, e, f] = [1, 2, 3].map(|k| values[k] - values[0]);
+        let DVec3 { x, y, z } = (across * d + beside * e + over * f) * det.signum();
+        Some(if det == 0.0 { [0.0; 4] } else { [x, y, z, det.abs()] })
+    }
+
+    /// The determinant of a tetrahedron that may be flat but for rounding, of the sign that its points have.
+    #[cold]
+    #[inline(never)]
+    fn sure(&self, points: &[DVec3; 4], [a, b, c]: [DVec3; 3], det: f64) -> f64 {
+        let doubt = DOUBT
             * a.abs().dot(DVec3::new(
                 b.y.abs() * c.z.abs() + b.z.abs() * c.y.abs(),
                 b.z.abs() * c.x.abs() + b.x.abs() * c.z.abs(),
                 b.x.abs() * c.y.abs() + b.y.abs() * c.x.abs(),
             ));
-        if det.abs() <= doubt {
-            let [p, q, r, s] = points.map(|p| {
-                let DVec3 { x, y, z } = p * self.scale;
-                Coord3D { x, y, z }
-            });
-            // Shewchuk's sign is that of det(p − s, q − s, r − s), the opposite of ours.
-            det = -robust::orient3d(p, q, r, s);
-            if det == 0.0 {
-                return None;
-            }
+        if det.abs() > doubt {
+            return det;
         }
-        let [d, e, f] = [1, 2, 3].map(|k| values[k] - values[0]);
-        Some(((across * d + beside * e + over * f) * det.signum(), det.abs()))
+        let [p, q, r, s] = points.map(|p| {
+            let DVec3 { x, y, z } = p * self.scale;
+            Coord3D { x, y, z }
+        });
+        // Shewchuk's sign is that of det(p − s, q − s, r − s), the opposite of ours.
+        -robust::orient3d(p, q, r, s)
     }
 }
 

@@ -124,13 +124,17 @@ pub(crate) fn power<S: Simd>(simd: S, x: Floats<S>, p: f32) -> Floats<S> {
         let zero = Floats::splat(simd, 0.0);
         return x.simd_gt(zero).select(exp(simd, ln(simd, some) * p), zero);
     }
-    let (mut rest, mut square, mut product) = (p as u32, x, one);
-    while rest > 0 {
-        if rest % 2 == 1 {
-            product *= square;
+    let p = p as u32;
+    if p == 0 {
+        return one;
+    }
+    // From the second highest bit on.
+    let mut product = x;
+    for k in (0..p.ilog2()).rev() {
+        product *= product;
+        if p >> k & 1 == 1 {
+            product *= x;
         }
-        square *= square;
-        rest /= 2;
     }
     product
 }

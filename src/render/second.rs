@@ -207,7 +207,7 @@ impl Extra {
         if needs && self.gradient.is_none() && field.association() == Association::Point {
             let count = mesh.points + mesh.tetrahedra.added.len();
             let points = mesh.geometry.points_of_mesh(&mesh.tetrahedra, count);
-            self.gradient = Some(Gradient::new(&points, &mesh.tetrahedra, field)?);
+            self.gradient = Some(Gradient::of(&points, &mesh.tetrahedra, field, mesh.geometry.is_apart())?);
         }
         // Gradients are per normalised length so far.
         let scale = mesh.geometry.scale;

@@ -11,6 +11,7 @@
 
 mod nodes;
 mod panel;
+mod pieces;
 mod room;
 mod rows;
 #[cfg(test)]
@@ -22,7 +23,7 @@ use super::panel::STEP;
 use super::{Bounded, Ready, Second};
 use crate::field::Normalization;
 use crate::integral::Knots;
-use crate::integral::floats::{Floats, LANES, erf, exp, opacity};
+use crate::integral::floats::{Floats, LANES};
 use crate::integral::knots::{Side, compile, sample};
 use crate::integral::options::Method;
 use crate::transfer::Convention;
@@ -30,8 +31,8 @@ use crate::transfer::bivariate::{Shape, Table};
 use crate::transfer::shading::{Origin, Shading};
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, mask32x16};
-use panel::{Rule, SHARE};
-use room::window_mut;
+use panel::{LONGER, Rule, SHARE};
+use room::{Numbers, load, window_mut};
 pub(crate) use room::{Room, Row, window};
 #[cfg(test)]
 pub(crate) use rows::Head;
@@ -62,11 +63,12 @@ pub(crate) struct Wide {
     silhouette: Option<f32>,
     /// Something depends on how the gradient is turned to the ray, whichever side it is.
     on_ray: bool,
-    /// The cosine of the angle by which normals may turn in a panel.
-    cosine: f32,
+    /// The cosines of the angles by which normals may turn in a panel of three nodes, and in one of four.
+    cosines: [f32; 2],
     /// What the way between the ends of normals is multiplied by to be panels.
     turn: f32,
-    rule: Rule,
+    /// Of three nodes, and of four.
+    rules: [Rule; 2],
     /// Nothing of it is for vectors.
     by_hand: bool,
 }
@@ -124,6 +126,8 @@ struct Lighting {
     power: f32,
     two_sided: bool,
     reflected: bool,
+    /// All light is.
+    is_white: bool,
     /// Colour times intensity, and where it comes from; the eye, if nowhere else.
     lights: Vec<([f32; 3], Option<[f32; 3]>)>,
 }
@@ -164,6 +168,31 @@ struct Segments<S: Simd, const N: usize> {
     along: [Floats<S>; 3],
     length: Floats<S>,
     there: mask32x16<S>,
+}
+
+impl<S: Simd, const N: usize> Segments<S, N> {
+    /// Sixteen of those in `rows`.
+    #[inline(always)]
+    fn new(simd: S, rows: &Numbers, at: usize, there: u64) -> Self {
+        let of = |row: usize| load(simd, window(&rows[row], at));
+        let mut segments = Segments {
+            at: [Floats::splat(simd, 0.0); N],
+            rise: [Floats::splat(simd, 0.0); N],
+            along: [Floats::splat(simd, 0.0); 3],
+            length: of(Row::<N>::LENGTH),
+            there: mask32x16::from_bitmask(simd, there),
+        };
+        for n in 0..N {
+            segments.at[n] = of(Row::<N>::AT + n);
+            segments.rise[n] = of(Row::<N>::RISE + n);
+        }
+        if N == 5 {
+            for k in 0..3 {
+                segments.along[k] = of(Row::<N>::ALONG + k);
+            }
+        }
+        segments
+    }
 }
 
 /// What segments emit and absorb, but for those that must be taken one by one, a bit each; panels.
@@ -257,9 +286,9 @@ impl Wide {
             light: shading.and_then(|s| Lighting::new(s, second)),
             silhouette: silhouette.map(|p| p as f32),
             on_ray: silhouette.is_some() || second.lights.iter().any(|l| l.origin == Origin::Headlight),
-            cosine: most_turn.cos() as f32,
+            cosines: [1.0, f64::from(LONGER)].map(|longer| (most_turn * longer).cos() as f32),
             turn: (0.5 / (0.5 * most_turn).sin()) as f32,
-            rule: Rule::new(&second.rules.three),
+            rules: [Rule::new(&second.rules.three, 3), Rule::new(&second.rules.four, 4)],
             by_hand: second.two.method != Method::Adaptive
                 || second.published.is_some()
                 || !second.is_even
@@ -349,7 +378,13 @@ impl Wide {
                 let mut panels = 0;
                 for first in (from..to).step_by(LANES) {
                     let there = u64::MAX >> (64 - (to - first).min(LANES));
-                    let taken = self.light::<S, N>(simd, cell, room, first, there);
+                    // None if they are cut in pieces, which come later.
+                    let Some(taken) = self.light::<S, N>(simd, cell, room, first, there) else {
+                        if room.pieces.is_full() {
+                            panels += self.join::<S, N>(simd, cell, room, left);
+                        }
+                        continue;
+                    };
                     panels += u64::from(taken.panels);
                     for k in 0..3 {
                         taken.color[k].store_array(window_mut(&mut room.rows[Row::<N>::LIGHT + k], first));
@@ -357,40 +392,58 @@ impl Wide {
                     taken.alpha.store_array(window_mut(&mut room.rows[Row::<N>::LIGHT + 3], first));
                     (0..LANES).filter(|l| taken.left >> l & 1 == 1).for_each(|l| left(first + l));
                 }
-                panels
+                panels + self.join::<S, N>(simd, cell, room, left)
             },
         )
     }
 
-    /// What sixteen segments emit and absorb.
+    /// What sixteen segments emit and absorb; none if they were put to the pieces.
     #[inline(always)]
-    fn light<S: Simd, const N: usize>(&self, simd: S, cell: &Cell, room: &mut Room, at: usize, there: u64) -> Taken<S> {
+    fn light<S: Simd, const N: usize>(
+        &self,
+        simd: S,
+        cell: &Cell,
+        room: &mut Room,
+        at: usize,
+        there: u64,
+    ) -> Option<Taken<S>> {
         let zero = Floats::splat(simd, 0.0);
         if cell.by_hand {
-            return Taken { color: [zero; 3], alpha: zero, left: there, panels: 0 };
+            return Some(Taken { color: [zero; 3], alpha: zero, left: there, panels: 0 });
         }
-        let mut segments = Segments {
-            at: [zero; N],
-            rise: [zero; N],
-            along: [zero; 3],
-            length: room.load(simd, Row::<N>::LENGTH, at),
-            there: mask32x16::from_bitmask(simd, there),
-        };
-        for n in 0..N {
-            segments.at[n] = room.load(simd, Row::<N>::AT + n, at);
-            segments.rise[n] = room.load(simd, Row::<N>::RISE + n, at);
-        }
-        if N == 5 {
-            for k in 0..3 {
-                segments.along[k] = room.load(simd, Row::<N>::ALONG + k, at);
-            }
-        }
+        let segments = Segments::<S, N>::new(simd, &room.rows, at, there);
         if N == 2 && cell.is_gaussian {
-            return self.gaussian(simd, cell, &segments);
+            return Some(self.gaussian(simd, cell, &segments));
         }
         let bend = self.bend(simd, cell, &segments);
         let breaks = cell.breaks || self.light_turns(simd, &segments);
-        self.step(simd, cell, &segments, breaks, bend, room)
+        let bends = (segments.there & bend.simd_gt(Floats::splat(simd, self.most_bend()))).to_bitmask();
+        if !breaks && bends == 0 {
+            let four = self.takes_four(simd, &segments, bend);
+            return Some(self.step(simd, cell, &segments, None, four, room));
+        }
+        if self.cut(simd, cell, &segments, (breaks, bend), at, room) {
+            return None;
+        }
+        Some(self.step(simd, cell, &segments, Some((breaks, bend)), false, room))
+    }
+
+    /// The panels of three nodes that bends of a piece may ask for.
+    #[inline(always)]
+    fn most_bend(&self) -> f32 {
+        // The logarithm's panels are of three.
+        if self.is_logarithmic { 1.0 } else { LONGER }
+    }
+
+    /// Whether one of some pieces asks for more than a panel of three nodes.
+    #[inline(always)]
+    fn takes_four<S: Simd, const N: usize>(&self, simd: S, segments: &Segments<S, N>, bend: Floats<S>) -> bool {
+        let one = Floats::splat(simd, 1.0);
+        let mut more = bend.simd_gt(one);
+        if N == 5 {
+            more |= !nodes::turn_little(simd, segments, one * 0.0, one, self.cosines[0]);
+        }
+        !self.is_logarithmic && (segments.there & more).to_bitmask() != 0
     }
 
     /// Panels that the bends of widgets ask for.
@@ -398,7 +451,11 @@ impl Wide {
     fn bend<S: Simd, const N: usize>(&self, simd: S, cell: &Cell, segments: &Segments<S, N>) -> Floats<S> {
         let mut most = Floats::splat(simd, 0.0);
         if N == 5 {
-            most = nodes::way(simd, segments) * self.turn;
+            let (start, all) = (most, Floats::splat(simd, 1.0));
+            let little = nodes::turn_little(simd, segments, start, all, self.cosines[0]);
+            if (segments.there & !little).to_bitmask() != 0 {
+                most = nodes::way(simd, segments) * self.turn;
+            }
         }
         let Source::Widgets(widgets) = &self.source else { return most };
         for &i in &cell.active[..cell.count()] {
@@ -418,64 +475,6 @@ impl Wide {
         }
         // A logarithm of what bends bends more.
         if self.is_logarithmic { most * LOGARITHMIC } else { most }
-    }
-
-    /// One Gaussian alone: the closed form of [`super::closed`], or its series where little bends.
-    #[inline(always)]
-    fn gaussian<S: Simd, const N: usize>(&self, simd: S, cell: &Cell, segments: &Segments<S, N>) -> Taken<S> {
-        let (zero, of) = (Floats::splat(simd, 0.0), Floats::splat);
-        let mut taken = Taken { color: [zero; 3], alpha: zero, left: 0, panels: 0 };
-        let Source::Widgets(widgets) = &self.source else { return taken };
-        let widget = &widgets[usize::from(cell.active[0])];
-        let Form::Gaussian { scale, offset } = &widget.form else { return taken };
-        let (dx, dy) = (segments.rise[0] * scale[0], segments.rise[1] * scale[1]);
-        // In the middle.
-        let (half, one) = (of(simd, 0.5), of(simd, 1.0));
-        let x = half.mul_add(dx, segments.at[0].mul_add(of(simd, scale[0]), of(simd, offset[0])));
-        let y = half.mul_add(dy, segments.at[1].mul_add(of(simd, scale[1]), of(simd, offset[1])));
-        let slope = x.mul_add(dx, y * dy);
-        let (s, c) = (slope * slope, dx.mul_add(dx, dy * dy));
-        let two = (s - c) * 0.5;
-        let four = s * (s * (1.0 / 24.0) - c * 0.25) + c * c * 0.125;
-        let six = s * (s * (s * (1.0 / 720.0) - c * (1.0 / 48.0)) + c * c * (1.0 / 16.0)) - c * c * c * (1.0 / 48.0);
-        let mean = two.mul_add(of(simd, 1.0 / 12.0), one) + four.mul_add(of(simd, 1.0 / 80.0), six * (1.0 / 448.0));
-        let mut mean = exp(simd, x.mul_add(x, y * y) * -0.5) * mean;
-        let bends = s.simd_ge(of(simd, 0.25)) | c.simd_ge(of(simd, 0.1));
-        if bends.to_bitmask() != 0 {
-            // |x|²/2 is (A t + B)² + C₀ for t from −½ to ½.
-            let steep = (c * 0.5).max(of(simd, 1e-6)).sqrt();
-            let over = one / steep;
-            let before = slope * 0.5 * over;
-            let aside = x * dy - y * dx;
-            let peak = exp(simd, aside * aside * -0.25 * over * over);
-            let ends = erf(simd, steep.mul_add(half, before)) - erf(simd, before - steep * half);
-            let whole = peak * ends * over * (0.5 * std::f32::consts::PI.sqrt());
-            mean = bends.select(whole, mean);
-        }
-        let depth = (mean * segments.length * (widget.opacity * self.absorbing)).max(zero);
-        let alpha = segments.there.select(opacity(simd, depth), zero);
-        taken.color = [alpha * widget.color[0], alpha * widget.color[1], alpha * widget.color[2]];
-        taken.alpha = alpha;
-        taken
-    }
-
-    /// Whether a segment passes a place where a face of the light turns away.
-    #[inline(always)]
-    fn light_turns<S: Simd, const N: usize>(&self, simd: S, segments: &Segments<S, N>) -> bool {
-        if N < 5 {
-            return false;
-        }
-        let (zero, mut turns) = (Floats::splat(simd, 0.0), 0);
-        if self.on_ray {
-            let [front, rise] = panel::towards(segments, segments.along);
-            turns |= (front * (front + rise)).simd_lt(zero).to_bitmask();
-        }
-        for (_, to) in self.light.as_ref().map_or(&[][..], |l| &l.lights) {
-            let Some(to) = to else { continue };
-            let [front, rise] = panel::towards(segments, nodes::splat(simd, *to));
-            turns |= (front * (front + rise)).simd_lt(zero).to_bitmask();
-        }
-        turns & segments.there.to_bitmask() != 0
     }
 }
 

@@ -25,7 +25,8 @@ pub(super) struct Kept {
     room: Room,
     /// What cells see, and the first of their fragments.
     runs: Vec<(Cell, usize)>,
-    /// Of each block its first fragment, which pixels have one, and the greatest extinction in the cell.
+    /// Of each block its run, its first fragment, which pixels have one, and the greatest extinction in the cell.
+    run: [u8; MOST_BLOCKS],
     start: [u16; MOST_BLOCKS],
     there: [u16; MOST_BLOCKS],
     densest: [f32; MOST_BLOCKS],
@@ -41,6 +42,7 @@ impl Default for Kept {
         Kept {
             room: Room::default(),
             runs: vec![],
+            run: [0; MOST_BLOCKS],
             start: [0; MOST_BLOCKS],
             there: [0; MOST_BLOCKS],
             densest: [0.0; MOST_BLOCKS],
@@ -95,52 +97,74 @@ impl<const N: usize> Canvas<N> {
         );
     }
 
-    /// Puts the fragments found side by side, and says how many they are.
+    /// Finds which blocks are of cells that see the same: their runs.
     #[inline(always)]
-    fn pack<S: Simd>(&mut self, simd: S, two: &OfTwo, records: &Records<N>) -> usize {
-        let load = |v: &[f32; LANES]| Floats::load_array_ref(simd, v);
-        self.kept.room.make::<N>();
+    fn sort(&mut self, two: &OfTwo, records: &Records<N>) {
         self.kept.runs.clear();
-        self.kept.left.clear();
-        let (mut all, mut last, mut densest) = (0, None, 0.0);
+        let (mut last, mut run, mut densest) = (None, 0, 0.0);
         for i in 0..self.found.count.min(MOST_BLOCKS) {
             let r = self.found.record(records, i);
             if last != Some(r.first_block) {
                 last = Some(r.first_block);
                 let (cell, most) = two.wide.cell(&r.span);
                 densest = most;
-                if self.kept.runs.last().is_none_or(|run| run.0 != cell) {
-                    self.kept.runs.push((cell, all));
+                run = self.kept.runs.iter().position(|run| run.0 == cell).unwrap_or(self.kept.runs.len());
+                if run == self.kept.runs.len() {
+                    self.kept.runs.push((cell, 0));
                 }
             }
-            let [x, y] = self.found.pixels_from(simd, r, i);
-            let [first, second, length] = self.span(simd, r, i);
-            let there = load(&self.found.enter[i]).simd_lt(load(&self.found.leave[i]));
-            let at = self.found.place(i);
-            let bits = there.to_bitmask();
-            (self.kept.start[i], self.kept.there[i], self.kept.densest[i]) = (all as u16, bits as u16, densest);
-            let rows = &mut self.kept.room.rows;
-            for n in 0..N {
-                let [s, gx, gy, gz] = r.field[n];
-                let side = x * gx + y * gy;
-                let (base, along) = (side + s, side * r.kappa + gz);
-                let (low, high) = (Floats::splat(simd, r.span[n][0]), Floats::splat(simd, r.span[n][1]));
-                let front = first.mul_add(along, base).max(low).min(high);
-                let back = second.mul_add(along, base).max(low).min(high);
-                put(simd, rows, Row::<N>::AT + n, all, front, there);
-                put(simd, rows, Row::<N>::RISE + n, all, back - front, there);
-            }
-            put(simd, rows, Row::<N>::LENGTH, all, length, there);
-            if N == 5 {
-                for k in 0..3 {
-                    put(simd, rows, Row::<N>::ALONG + k, all, load(window(&self.kept.along[k], at)), there);
+            (self.kept.run[i], self.kept.densest[i]) = (run as u8, densest);
+        }
+    }
+
+    /// Puts the fragments found side by side, run by run, and says how many they are.
+    #[inline(always)]
+    fn pack<S: Simd>(&mut self, simd: S, two: &OfTwo, records: &Records<N>) -> usize {
+        self.kept.left.clear();
+        self.sort(two, records);
+        let mut all = 0;
+        for run in 0..self.kept.runs.len() {
+            self.kept.runs[run].1 = all;
+            for i in 0..self.found.count.min(MOST_BLOCKS) {
+                if usize::from(self.kept.run[i]) == run {
+                    all += self.put_block(simd, records, i, all);
                 }
-                put(simd, rows, Row::<N>::FIRST, all, first, there);
             }
-            length.store_array(&mut self.found.length[i]);
-            all += bits.count_ones() as usize;
         }
         all
+    }
+
+    /// Puts the fragments of the `i`-th block to place `all` and behind; says how many they are.
+    #[inline(always)]
+    fn put_block<S: Simd>(&mut self, simd: S, records: &Records<N>, i: usize, all: usize) -> usize {
+        let load = |v: &[f32; LANES]| Floats::load_array_ref(simd, v);
+        let r = self.found.record(records, i);
+        let [x, y] = self.found.pixels_from(simd, r, i);
+        let [first, second, length] = self.span(simd, r, i);
+        let there = load(&self.found.enter[i]).simd_lt(load(&self.found.leave[i]));
+        let at = self.found.place(i);
+        let bits = there.to_bitmask();
+        (self.kept.start[i], self.kept.there[i]) = (all as u16, bits as u16);
+        let rows = &mut *self.kept.room.rows;
+        for n in 0..N {
+            let [s, gx, gy, gz] = r.field[n];
+            let side = x * gx + y * gy;
+            let (base, along) = (side + s, side * r.kappa + gz);
+            let (low, high) = (Floats::splat(simd, r.span[n][0]), Floats::splat(simd, r.span[n][1]));
+            let front = first.mul_add(along, base).max(low).min(high);
+            let back = second.mul_add(along, base).max(low).min(high);
+            put(simd, rows, Row::<N>::AT + n, all, front, there);
+            put(simd, rows, Row::<N>::RISE + n, all, back - front, there);
+        }
+        put(simd, rows, Row::<N>::LENGTH, all, length, there);
+        if N == 5 {
+            for k in 0..3 {
+                put(simd, rows, Row::<N>::ALONG + k, all, load(window(&self.kept.along[k], at)), there);
+            }
+            put(simd, rows, Row::<N>::FIRST, all, first, there);
+        }
+        length.store_array(&mut self.found.length[i]);
+        bits.count_ones() as usize
     }
 
     /// Adds what the fragments emit and absorb to their pixels.
@@ -173,11 +197,12 @@ impl<const N: usize> Canvas<N> {
         let lens = scene.lens;
         for k in 0..self.kept.left.len() {
             let at = self.kept.left[k];
-            // Its block is the last that begins so early, and its pixel the one after so many others.
-            let blocks = &self.kept.start[..self.found.count.min(MOST_BLOCKS)];
-            let block = blocks.partition_point(|&start| usize::from(start) <= at).saturating_sub(1);
+            // Its block is the one that it is behind the start of, and its pixel the one after so many others.
+            let start = |block: usize| usize::from(self.kept.start[block]);
+            let holds = |&block: &usize| (start(block)..start(block) + self.count_there(block)).contains(&at);
+            let block = (0..self.found.count.min(MOST_BLOCKS)).find(holds).unwrap_or_default();
             let mut there = self.kept.there[block];
-            (usize::from(blocks[block])..at).for_each(|_| there &= there.wrapping_sub(1));
+            (start(block)..at).for_each(|_| there &= there.wrapping_sub(1));
             let pixel = self.found.place(block) + there.trailing_zeros() as usize;
             let [column, row] = self.column_row(pixel);
             let r = self.found.record(records, block);
@@ -212,6 +237,11 @@ impl<const N: usize> Canvas<N> {
         }
     }
 
+    /// How many fragments a block has.
+    fn count_there(&self, block: usize) -> usize {
+        self.kept.there[block].count_ones() as usize
+    }
+
     /// Column and row of the ray of a pixel.
     fn column_row(&self, at: usize) -> [f64; 2] {
         let [i, j] = pixel_at(at).map(f64::from);
@@ -241,9 +271,9 @@ impl<const N: usize> Canvas<N> {
 
 /// Puts those of some numbers that are there next to each other, in a row from place `at` on.
 #[inline(always)]
-fn put<S: Simd, const M: usize>(
+fn put<S: Simd, const M: usize, const R: usize>(
     simd: S,
-    rows: &mut [[f32; M]],
+    rows: &mut [[f32; M]; R],
     row: usize,
     at: usize,
     v: Floats<S>,

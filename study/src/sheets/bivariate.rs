@@ -1,6 +1,8 @@
-//! Functions of two variables: table 1 and the figures of Song, Chen, Maciejewski, Gaither & Ebert (2009), with errors.
+//! Functions of two variables: table 1, the figures and the equations of Song, Chen, Maciejewski, Gaither & Ebert (2009), with
+//! errors.
 
 mod places;
+mod published;
 
 use super::{Options, Row, Sheet, Variant, check, set};
 use anyhow::{Context, Result};
@@ -15,6 +17,7 @@ use halite::view::View;
 use halite_console::request::{self, Job};
 use halite_console::{output, progress};
 use places::{As, Places};
+use published::Published;
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -42,6 +45,7 @@ struct Studied {
     culled: Vec<u64>,
     /// Gradients of all points, in ms.
     gradients_ms: f64,
+    published: Vec<Published>,
 }
 
 /// A picture of the sheet, and what it should be.
@@ -121,7 +125,9 @@ fn studied(
     renderer: &mut Renderer,
 ) -> Result<(Studied, Places)> {
     let (view, _) = job.scene.view()?;
-    let (places, gradients_ms) = judge.install(|| Places::new(job))?;
+    let (places, gradient, gradients_ms) = judge.install(|| Places::new(job))?;
+    let published = Published::all(job, &places, &gradient);
+    drop(gradient);
     set(judge, job)?;
     set(renderer, job)?;
     let (one, gaussian) = (places.bands()?, places.gaussian()?);
@@ -147,7 +153,7 @@ fn studied(
     check(&rows)?;
     let name = path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
     let tetrahedra = renderer.stats().tetrahedra;
-    Ok((Studied { name, tetrahedra, rows, culled, gradients_ms }, places))
+    Ok((Studied { name, tetrahedra, rows, culled, gradients_ms, published }, places))
 }
 
 fn picture(
@@ -211,7 +217,7 @@ impl Studied {
         let reported = TABLE_1.iter().find(|(name, _)| self.name.starts_with(name)).map(|known| known.1);
         json!({
             "mesh": self.name, "tetrahedra": self.tetrahedra, "gradients_ms": self.gradients_ms, "variants": rows,
-            "reported_frames_per_s": reported,
+            "reported_frames_per_s": reported, "published": self.published.iter().map(Published::report).collect::<Vec<_>>(),
         })
     }
 }
@@ -249,7 +255,7 @@ fn table(studied: &Studied) -> String {
             r.variant.place
         );
     }
-    text + "\n"
+    text + "\n" + &published::described(&studied.published)
 }
 
 fn described(figures: &[Figure]) -> String {

@@ -2,7 +2,7 @@
 
 #![allow(clippy::needless_range_loop, reason = "closures over arrays of vectors are not inlined")]
 
-use super::panel::Held;
+use super::panel::{Held, towards};
 use super::room::load;
 use super::{Cell, Form, Lighting, Room, Segments, Source, Wide};
 use crate::integral::floats::{Floats, depth_of_opacity, exp, fraction, power, sine};
@@ -164,16 +164,23 @@ impl Wide {
             factor = held.factor.at(simd, g, 0);
         }
         if N == 5 {
-            let normal = normal(simd, segments, u);
-            let on_ray = dot(normal, segments.along);
+            let over = over_length(simd, segments, u);
+            let on_ray = held.on_ray[1].mul_add(u, held.on_ray[0]) * over;
             if let Some(p) = self.silhouette {
                 factor *= power(simd, (one - on_ray.abs()).max(zero), p);
             }
             if let Some(light) = &self.light {
-                let [diffuse, specular] = light.coming(simd, segments, room, normal, on_ray);
-                red = red.mul_add(diffuse[0], specular[0] * white);
-                green = green.mul_add(diffuse[1], specular[1] * white);
-                blue = blue.mul_add(diffuse[2], specular[2] * white);
+                let [diffuse, specular] = light.coming(simd, room, u, over, on_ray);
+                if light.is_white {
+                    let shining = specular[0] * white;
+                    red = red.mul_add(diffuse[0], shining);
+                    green = green.mul_add(diffuse[0], shining);
+                    blue = blue.mul_add(diffuse[0], shining);
+                } else {
+                    red = red.mul_add(diffuse[0], specular[0] * white);
+                    green = green.mul_add(diffuse[1], specular[1] * white);
+                    blue = blue.mul_add(diffuse[2], specular[2] * white);
+                }
             }
         }
         if !direct {
@@ -198,14 +205,20 @@ fn gradient<S: Simd, const N: usize>(segments: &Segments<S, N>, u: Floats<S>) ->
     [rise[x].mul_add(u, at[x]), rise[y].mul_add(u, at[y]), rise[z].mul_add(u, at[z])]
 }
 
-/// Its direction; zero where it is as good as none.
+/// One over its length; zero where it is as good as none.
 #[inline(always)]
-fn normal<S: Simd, const N: usize>(simd: S, segments: &Segments<S, N>, u: Floats<S>) -> [Floats<S>; 3] {
+fn over_length<S: Simd, const N: usize>(simd: S, segments: &Segments<S, N>, u: Floats<S>) -> Floats<S> {
     let v = gradient(segments, u);
     let length = dot(v, v).sqrt();
     let some = length.simd_gt(Floats::splat(simd, FLAT));
-    let scale = some.select(Floats::splat(simd, 1.0) / length, Floats::splat(simd, 0.0));
-    [v[0] * scale, v[1] * scale, v[2] * scale]
+    some.select(Floats::splat(simd, 1.0) / length, Floats::splat(simd, 0.0))
+}
+
+/// Its direction; zero where it is as good as none.
+#[inline(always)]
+fn normal<S: Simd, const N: usize>(simd: S, segments: &Segments<S, N>, u: Floats<S>) -> [Floats<S>; 3] {
+    let (v, over) = (gradient(segments, u), over_length(simd, segments, u));
+    [v[0] * over, v[1] * over, v[2] * over]
 }
 
 #[inline(always)]
@@ -236,71 +249,79 @@ impl Lighting {
             two_sided: shade.two_sided,
             reflected: shade.highlight == Highlight::Reflected,
             lights: second.lights.iter().map(light).collect(),
+            is_white: second.lights.iter().all(|l| l.color == [l.color[0]; 3]),
         })
     }
 
-    /// By what colours are multiplied, and what is added for white: of normals, whose cosines with the rays are `on_ray`.
+    /// By what colours are multiplied, and what is added for white, at the places `u` of pieces: one over the lengths of gradients, and
+    /// the cosines of normals with the rays, are there already. White light is in the first channel alone.
     #[inline(always)]
-    fn coming<S: Simd, const N: usize>(
+    fn coming<S: Simd>(
         &self,
         simd: S,
-        segments: &Segments<S, N>,
         room: &Room,
-        normal: [Floats<S>; 3],
+        u: Floats<S>,
+        over: Floats<S>,
         on_ray: Floats<S>,
     ) -> [[Floats<S>; 3]; 2] {
         let zero = Floats::splat(simd, 0.0);
+        let channels = if self.is_white { 1 } else { 3 };
         let (mut diffuse, mut specular) = ([Floats::splat(simd, self.ambient); 3], [zero; 3]);
-        for (i, (intensity, to)) in self.lights.iter().enumerate() {
-            let cosine = match to {
-                None => zero - on_ray,
-                Some(to) => dot(normal, splat(simd, *to)),
-            };
+        for ((intensity, to), lamp) in self.lights.iter().zip(&room.lamps) {
+            let along = |k: usize| load(simd, &lamp[k + 1]).mul_add(u, load(simd, &lamp[k]));
+            let cosine = if to.is_none() { zero - on_ray } else { along(0) * over };
             let falls = if self.two_sided { cosine.abs() } else { cosine.max(zero) };
             let scattered = falls * self.diffuse;
-            for k in 0..3 {
-                diffuse[k] = scattered.mul_add(Floats::splat(simd, intensity[k]), diffuse[k]);
+            diffuse[0] = scattered.mul_add(Floats::splat(simd, intensity[0]), diffuse[0]);
+            if channels > 1 {
+                diffuse[1] = scattered.mul_add(Floats::splat(simd, intensity[1]), diffuse[1]);
+                diffuse[2] = scattered.mul_add(Floats::splat(simd, intensity[2]), diffuse[2]);
             }
             if self.specular == 0.0 {
                 continue;
             }
             let mut shines = falls;
             if self.reflected {
-                let toward = match to {
-                    None => Floats::splat(simd, -1.0),
-                    Some(to) => dot(segments.along, splat(simd, *to)),
-                };
+                let toward = if to.is_none() { Floats::splat(simd, -1.0) } else { load(simd, &lamp[2]) };
                 shines = (toward - cosine * on_ray * 2.0).max(zero);
             } else if to.is_some() {
-                let half = &room.half[i % super::MOST_LIGHTS];
-                let half = [load(simd, &half[0]), load(simd, &half[1]), load(simd, &half[2])];
-                let on_half = dot(normal, half);
+                let on_half = along(2) * over;
                 shines = if self.two_sided { on_half.abs() } else { on_half.max(zero) };
             }
             let bright = falls.simd_gt(zero).select(power(simd, shines, self.power), zero) * self.specular;
-            for k in 0..3 {
-                specular[k] = bright.mul_add(Floats::splat(simd, intensity[k]), specular[k]);
+            specular[0] = bright.mul_add(Floats::splat(simd, intensity[0]), specular[0]);
+            if channels > 1 {
+                specular[1] = bright.mul_add(Floats::splat(simd, intensity[1]), specular[1]);
+                specular[2] = bright.mul_add(Floats::splat(simd, intensity[2]), specular[2]);
             }
         }
         [diffuse, specular]
     }
 
-    /// Finds, of each light that has a direction, that half way between it and the one to the eye.
+    /// Finds, of each light that has a direction, what is linear along segments: the gradient towards it, and half way between it and
+    /// the eye; or of what is reflected the cosine of the light with the ray.
     #[inline(always)]
-    pub(super) fn half_ways<S: Simd, const N: usize>(&self, simd: S, segments: &Segments<S, N>, room: &mut Room) {
-        if self.specular == 0.0 || self.reflected {
-            return;
-        }
-        for ((_, to), half) in self.lights.iter().zip(&mut room.half) {
+    pub(super) fn prepare<S: Simd, const N: usize>(&self, simd: S, segments: &Segments<S, N>, room: &mut Room) {
+        for ((_, to), lamp) in self.lights.iter().zip(&mut room.lamps) {
             let Some(to) = to else { continue };
-            let [x, y, z] = splat(simd, *to);
-            let sum = [x - segments.along[0], y - segments.along[1], z - segments.along[2]];
+            let to = splat(simd, *to);
+            let [front, rise] = towards(segments, to);
+            front.store_array(&mut lamp[0]);
+            rise.store_array(&mut lamp[1]);
+            if self.specular == 0.0 {
+                continue;
+            }
+            if self.reflected {
+                dot(segments.along, to).store_array(&mut lamp[2]);
+                continue;
+            }
+            let sum = [to[0] - segments.along[0], to[1] - segments.along[1], to[2] - segments.along[2]];
             let length = dot(sum, sum).sqrt();
             let some = length.simd_gt(Floats::splat(simd, 1e-6));
             let scale = some.select(Floats::splat(simd, 1.0) / length, Floats::splat(simd, 0.0));
-            for k in 0..3 {
-                (sum[k] * scale).store_array(&mut half[k]);
-            }
+            let [front, rise] = towards(segments, [sum[0] * scale, sum[1] * scale, sum[2] * scale]);
+            front.store_array(&mut lamp[2]);
+            rise.store_array(&mut lamp[3]);
         }
     }
 }

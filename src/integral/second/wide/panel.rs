@@ -2,11 +2,10 @@
 
 #![allow(clippy::needless_range_loop, reason = "closures over arrays of vectors are not inlined")]
 
-use super::nodes::{Line, Node, OPAQUE, dot, splat, turn_little};
-use super::room::load;
+use super::nodes::{Line, Node, OPAQUE, dot, turn_little};
 use super::{Cell, Form, MOST_LINES, Room, Segments, Source, Taken, Texels, Wide};
 use crate::integral::Knots;
-use crate::integral::floats::{FAINT, Floats, LANES, faded, faint_opacity};
+use crate::integral::floats::{FAINT, Floats, LANES, erf, exp, faded, faint_opacity, opacity};
 use crate::integral::second::closed::Profile;
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, mask32x16};
@@ -14,47 +13,51 @@ use fearless_simd::{Simd, mask32x16};
 /// The share of what may change in a panel of four nodes that may in one of three: by what a Gaussian's argument moves then, its
 /// integral is off by 6e-6 of its peak.
 pub(super) const SHARE: f64 = 0.8;
+/// Nodes of a panel.
+const MOST_NODES: usize = 4;
+/// By how much longer panels of four nodes are than those of three.
+pub(super) const LONGER: f32 = 1.8;
 /// By what factor the argument of a logarithm changes in a panel.
 const FACTOR: f32 = 1.4;
 /// The most panels that bends may ask for.
-const MOST_PANELS: f32 = 32.0;
+pub(super) const MOST_PANELS: f32 = 32.0;
 /// By how often a panel in which a normal turns too far is halved before it is summed up.
-const HALVES: usize = 8;
+pub(super) const HALVES: usize = 8;
 /// Steps of one segment after another, taken or not.
 const MOST_STEPS: usize = 128;
 /// The shortest panels, as shares of a segment, unless they end where something turns.
 const SHORTEST: f32 = 1e-3;
 /// Places that are one, and phases.
-const SAME: f32 = 1e-6;
-const NEAR: f32 = 1e-5;
+pub(super) const SAME: f32 = 1e-6;
+pub(super) const NEAR: f32 = 1e-5;
 /// Transmittance of a segment below which nothing is told from nothing.
 const DARK: f32 = 1e-12;
 /// The greatest phase: f32 tells 1e-5 of it.
 pub(super) const FAR: f32 = 200.0;
-const EVERYWHERE: [f32; 2] = [f32::NEG_INFINITY, f32::INFINITY];
+pub(super) const EVERYWHERE: [f32; 2] = [f32::NEG_INFINITY, f32::INFINITY];
 
-/// Gauss's rule of three nodes in f32, and of each polynomial through them the integral to each.
+/// Gauss's rule of three or four nodes in f32, and of each polynomial through them the integral to each.
 #[derive(Debug, Clone)]
 pub(super) struct Rule {
-    nodes: [f32; 3],
-    weights: [f32; 3],
-    to_node: [[f32; 3]; 3],
+    count: usize,
+    nodes: [f32; MOST_NODES],
+    weights: [f32; MOST_NODES],
+    to_node: [[f32; MOST_NODES]; MOST_NODES],
 }
 
 impl Rule {
-    pub(super) fn new(rule: &crate::integral::second::panel::Rule) -> Self {
-        let three = |v: &[f64; 4]| [v[0] as f32, v[1] as f32, v[2] as f32];
-        let to = &rule.to_node;
-        Rule {
-            nodes: three(&rule.nodes),
-            weights: three(&rule.weights),
-            to_node: [three(&to[0]), three(&to[1]), three(&to[2])],
-        }
+    /// Of the first `count` nodes of `rule`.
+    pub(super) fn new(rule: &crate::integral::second::panel::Rule, count: usize) -> Self {
+        let all = |v: &[f64; MOST_NODES]| v.map(|x| x as f32);
+        let (nodes, weights) = (all(&rule.nodes), all(&rule.weights));
+        Rule { count, nodes, weights, to_node: rule.to_node.each_ref().map(all) }
     }
 
-    /// Nodes, weights, and of each polynomial the integral to each node.
+    /// Nodes, weights, and of each polynomial the integral to each node: of three.
     pub(super) fn parts(&self) -> ([f32; 3], [f32; 3], [[f32; 3]; 3]) {
-        (self.nodes, self.weights, self.to_node)
+        let three = |v: &[f32; MOST_NODES]| [v[0], v[1], v[2]];
+        let to = &self.to_node;
+        (three(&self.nodes), three(&self.weights), [three(&to[0]), three(&to[1]), three(&to[2])])
     }
 }
 
@@ -64,6 +67,8 @@ pub(super) struct Held<S: Simd> {
     pub(super) factor: Line<S, 1>,
     /// The first of four texels.
     pub(super) texel: [Floats<S>; 2],
+    /// In all of a segment, the gradient along the ray in front, and by how much that rises.
+    pub(super) on_ray: [Floats<S>; 2],
 }
 
 /// Whether what runs from one to the other end passes a whole number from `least` to `most`.
@@ -83,53 +88,6 @@ pub(super) fn towards<S: Simd, const N: usize>(segments: &Segments<S, N>, to: [F
     let [x, y, z] = [2.min(N - 1), 3.min(N - 1), 4.min(N - 1)];
     let Segments { at, rise, .. } = segments;
     [dot([at[x], at[y], at[z]], to), dot([rise[x], rise[y], rise[z]], to)]
-}
-
-/// `place`, if it is beyond `u` and before `next`; else `next`.
-#[inline(always)]
-fn nearer<S: Simd>(next: Floats<S>, place: Floats<S>, u: Floats<S>) -> Floats<S> {
-    place.simd_gt(u + SAME).select(next.min(place), next)
-}
-
-/// The sooner of `next` and where beyond `u` a whole number from `least` to `most` is passed.
-#[inline(always)]
-fn next_whole<S: Simd>(
-    simd: S,
-    next: Floats<S>,
-    at: Floats<S>,
-    rise: Floats<S>,
-    [least, most]: [f32; 2],
-    u: Floats<S>,
-) -> Floats<S> {
-    let (zero, least, most) = (Floats::splat(simd, 0.0), Floats::splat(simd, least), Floats::splat(simd, most));
-    let now = rise.mul_add(u, at);
-    let up = rise.simd_gt(zero);
-    let whole = up.select((now + NEAR).floor() + 1.0, (now - NEAR).ceil() - 1.0);
-    let whole = up.select(whole.max(least), whole.min(most));
-    let over = Floats::splat(simd, 1.0) / rise;
-    let place = (whole - at) * over;
-    // What is as good as here is followed by the next.
-    let place = place.simd_gt(u + SAME).select(place, place + over.abs());
-    let some = whole.simd_ge(least) & whole.simd_le(most) & !rise.simd_eq(zero);
-    nearer(next, some.select(place, Floats::splat(simd, f32::INFINITY)), u)
-}
-
-/// The sooner of `next` and where beyond `u` the start of one of the lines after the first is passed.
-#[inline(always)]
-fn next_knot<S: Simd>(
-    simd: S,
-    mut next: Floats<S>,
-    knots: &Knots<f32>,
-    lines: [u16; 2],
-    at: Floats<S>,
-    rise: Floats<S>,
-    u: Floats<S>,
-) -> Floats<S> {
-    let over = Floats::splat(simd, 1.0) / rise;
-    for k in usize::from(lines[0]) + 1..=usize::from(lines[1]) {
-        next = nearer(next, (Floats::splat(simd, knots.s[k]) - at) * over, u);
-    }
-    next
 }
 
 /// The line, of some, that values are on.
@@ -217,6 +175,7 @@ impl Wide {
         cell: &Cell,
         segments: &Segments<S, N>,
         middle: Floats<S>,
+        on_ray: [Floats<S>; 2],
         room: &mut Room,
     ) -> Held<S> {
         let zero = Floats::splat(simd, 0.0);
@@ -224,16 +183,20 @@ impl Wide {
             line: Line { start: zero, value: [zero; 4], slope: [zero; 4] },
             factor: Line { start: zero, value: [zero; 1], slope: [zero; 1] },
             texel: [zero; 2],
+            on_ray,
         };
         let s = segments.rise[0].mul_add(middle, segments.at[0]);
         let g = segments.rise[1].mul_add(middle, segments.at[1]);
         match &self.source {
             Source::Widgets(_) if cell.clipped == 0 => {}
-            Source::Widgets(_) => {
+            Source::Widgets(widgets) => {
                 for k in 0..cell.count() {
                     if cell.clips(k) {
-                        let [from, to] = [load(simd, &room.clips[k][0]), load(simd, &room.clips[k][1])];
-                        let inside = from.simd_lt(middle) & to.simd_gt(middle);
+                        let [of_s, of_g] = &widgets[usize::from(cell.active[k])].domain;
+                        let between = |v: Floats<S>, [low, high]: [f32; 2]| {
+                            v.simd_ge(Floats::splat(simd, low)) & v.simd_le(Floats::splat(simd, high))
+                        };
+                        let inside = between(s, *of_s) & between(g, *of_g);
                         inside.select(Floats::splat(simd, 1.0), zero).store_array(&mut room.on[k]);
                     }
                 }
@@ -247,114 +210,26 @@ impl Wide {
         held
     }
 
-    /// Finds where along segments the boxes of widgets are that end in the cell.
-    #[inline(always)]
-    fn clip<S: Simd, const N: usize>(&self, simd: S, cell: &Cell, segments: &Segments<S, N>, room: &mut Room) {
-        let Source::Widgets(widgets) = &self.source else { return };
-        let zero = Floats::splat(simd, 0.0);
-        for k in 0..cell.count() {
-            if !cell.clips(k) {
-                continue;
-            }
-            let domain = &widgets[usize::from(cell.active[k])].domain;
-            let (mut from, mut to) = (Floats::splat(simd, f32::NEG_INFINITY), Floats::splat(simd, f32::INFINITY));
-            for v in 0..2 {
-                let (at, rise) = (segments.at[v], segments.rise[v]);
-                let [low, high] = [Floats::splat(simd, domain[v][0]), Floats::splat(simd, domain[v][1])];
-                let over = Floats::splat(simd, 1.0) / rise;
-                let (a, b) = ((low - at) * over, (high - at) * over);
-                let still = rise.simd_eq(zero);
-                let outside = still & (at.simd_lt(low) | at.simd_gt(high));
-                from = still.select(from, from.max(a.min(b)));
-                to = still.select(to, to.min(a.max(b)));
-                to = outside.select(Floats::splat(simd, f32::NEG_INFINITY), to);
-            }
-            from.store_array(&mut room.clips[k][0]);
-            to.store_array(&mut room.clips[k][1]);
-        }
-    }
-
-    /// Where beyond `u` segments next turn or jump, or end.
-    #[inline(always)]
-    fn next<S: Simd, const N: usize>(
-        &self,
-        simd: S,
-        cell: &Cell,
-        segments: &Segments<S, N>,
-        room: &Room,
-        u: Floats<S>,
-    ) -> Floats<S> {
-        let mut next = Floats::splat(simd, 1.0);
-        let Segments { at, rise, .. } = segments;
-        match &self.source {
-            Source::Widgets(widgets) => {
-                for k in 0..cell.count() {
-                    if cell.clips(k) {
-                        next = nearer(next, load(simd, &room.clips[k][0]), u);
-                        next = nearer(next, load(simd, &room.clips[k][1]), u);
-                    }
-                    let Form::Wave { axis, start, profile } = &widgets[usize::from(cell.active[k])].form else {
-                        continue;
-                    };
-                    if cell.turning >> k & 1 == 0 {
-                        continue;
-                    }
-                    let [x, y] = [Floats::splat(simd, axis[0]), Floats::splat(simd, axis[1])];
-                    let p = at[0].mul_add(x, at[1].mul_add(y, Floats::splat(simd, *start)));
-                    let d = rise[0].mul_add(x, rise[1] * y);
-                    if profile.turns() == [0.0, 0.5] {
-                        next = next_whole(simd, next, p * 2.0, d * 2.0, EVERYWHERE, u);
-                        continue;
-                    }
-                    for &turn in profile.turns() {
-                        next = next_whole(simd, next, p - turn as f32, d, EVERYWHERE, u);
-                    }
-                }
-            }
-            Source::Scalar(knots) => next = next_knot(simd, next, knots, cell.lines, at[0], rise[0], u),
-            Source::Texels(texels) => {
-                for k in 0..2 {
-                    let scale = texels.scale[k];
-                    let place = at[k].mul_add(Floats::splat(simd, scale), Floats::splat(simd, texels.offset[k]));
-                    next = next_whole(simd, next, place, rise[k] * scale, [0.0, texels.size[k] as f32 - 1.0], u);
-                }
-            }
-        }
-        if let Some(factor) = &self.factor {
-            next = next_knot(simd, next, factor, cell.factors, at[1], rise[1], u);
-        }
-        if N == 5 {
-            let zero = Floats::splat(simd, 0.0);
-            let lights = self.light.as_ref().map_or(&[][..], |l| &l.lights);
-            if self.on_ray {
-                let [front, rise] = towards(segments, segments.along);
-                next = nearer(next, (zero - front) / rise, u);
-            }
-            for (_, to) in lights {
-                let Some(to) = to else { continue };
-                let [front, rise] = towards(segments, splat(simd, *to));
-                next = nearer(next, (zero - front) / rise, u);
-            }
-        }
-        next
-    }
-
     /// Light of panels of length `h`, and their opacity, which is that of `depth`.
     #[inline(always)]
     fn panel<S: Simd>(
         &self,
         simd: S,
-        nodes: &[Node<S>; 3],
-        depths: [Floats<S>; 3],
+        rule: &Rule,
+        nodes: &[Node<S>; MOST_NODES],
+        depths: [Floats<S>; MOST_NODES],
         depth: Floats<S>,
         shone: Floats<S>,
     ) -> ([Floats<S>; 3], Floats<S>) {
         let zero = Floats::splat(simd, 0.0);
         let (mut red, mut green, mut blue, mut absorbed) = (zero, zero, zero, zero);
-        let Rule { weights, to_node, .. } = &self.rule;
-        for i in 0..3 {
+        let Rule { count, weights, to_node, .. } = rule;
+        for i in 0..*count {
             let of = |j: usize| Floats::splat(simd, to_node[j][i]);
-            let before = depths[0].mul_add(of(0), depths[1].mul_add(of(1), depths[2] * of(2)));
+            let mut before = depths[0].mul_add(of(0), depths[1].mul_add(of(1), depths[2] * of(2)));
+            if *count > 3 {
+                before = depths[3].mul_add(of(3), before);
+            }
             let seen = faded(simd, before) * weights[i];
             red = seen.mul_add(nodes[i].color[0], red);
             green = seen.mul_add(nodes[i].color[1], green);
@@ -371,15 +246,79 @@ impl Wide {
         ([red * scale, green * scale, blue * scale], alpha)
     }
 
-    /// Segments that go each their own way.
+    /// One Gaussian alone: the closed form of [`super::closed`], or its series where little bends.
     #[inline(always)]
+    pub(super) fn gaussian<S: Simd, const N: usize>(
+        &self,
+        simd: S,
+        cell: &Cell,
+        segments: &Segments<S, N>,
+    ) -> Taken<S> {
+        let (zero, of) = (Floats::splat(simd, 0.0), Floats::splat);
+        let mut taken = Taken { color: [zero; 3], alpha: zero, left: 0, panels: 0 };
+        let Source::Widgets(widgets) = &self.source else { return taken };
+        let widget = &widgets[usize::from(cell.active[0])];
+        let Form::Gaussian { scale, offset } = &widget.form else { return taken };
+        let (dx, dy) = (segments.rise[0] * scale[0], segments.rise[1] * scale[1]);
+        // In the middle.
+        let (half, one) = (of(simd, 0.5), of(simd, 1.0));
+        let x = half.mul_add(dx, segments.at[0].mul_add(of(simd, scale[0]), of(simd, offset[0])));
+        let y = half.mul_add(dy, segments.at[1].mul_add(of(simd, scale[1]), of(simd, offset[1])));
+        let slope = x.mul_add(dx, y * dy);
+        let (s, c) = (slope * slope, dx.mul_add(dx, dy * dy));
+        let two = (s - c) * 0.5;
+        let four = s * (s * (1.0 / 24.0) - c * 0.25) + c * c * 0.125;
+        let six = s * (s * (s * (1.0 / 720.0) - c * (1.0 / 48.0)) + c * c * (1.0 / 16.0)) - c * c * c * (1.0 / 48.0);
+        let mean = two.mul_add(of(simd, 1.0 / 12.0), one) + four.mul_add(of(simd, 1.0 / 80.0), six * (1.0 / 448.0));
+        let mut mean = exp(simd, x.mul_add(x, y * y) * -0.5) * mean;
+        let bends = s.simd_ge(of(simd, 0.25)) | c.simd_ge(of(simd, 0.1));
+        if bends.to_bitmask() != 0 {
+            // |x|²/2 is (A t + B)² + C₀ for t from −½ to ½.
+            let steep = (c * 0.5).max(of(simd, 1e-6)).sqrt();
+            let over = one / steep;
+            let before = slope * 0.5 * over;
+            let aside = x * dy - y * dx;
+            let peak = exp(simd, aside * aside * -0.25 * over * over);
+            let ends = erf(simd, steep.mul_add(half, before)) - erf(simd, before - steep * half);
+            let whole = peak * ends * over * (0.5 * std::f32::consts::PI.sqrt());
+            mean = bends.select(whole, mean);
+        }
+        let depth = (mean * segments.length * (widget.opacity * self.absorbing)).max(zero);
+        let alpha = segments.there.select(opacity(simd, depth), zero);
+        taken.color = [alpha * widget.color[0], alpha * widget.color[1], alpha * widget.color[2]];
+        taken.alpha = alpha;
+        taken
+    }
+
+    /// Segments that go each their own way: by `own`, what some of them turn at, and panels of three nodes that bends ask for; or
+    /// without, pieces that are one panel, of `four` nodes or of three, unless they are deep.
+    ///
+    /// Not inlined: it is large, and called for both.
+    #[inline(never)]
     pub(super) fn step<S: Simd, const N: usize>(
         &self,
         simd: S,
         cell: &Cell,
         segments: &Segments<S, N>,
-        breaks: bool,
-        bend: Floats<S>,
+        own: Option<(bool, Floats<S>)>,
+        four: bool,
+        room: &mut Room,
+    ) -> Taken<S> {
+        let rule = &self.rules[usize::from(four)];
+        simd.vectorize(
+            #[inline(always)]
+            || self.step_here(simd, cell, segments, own, rule, room),
+        )
+    }
+
+    #[inline(always)]
+    fn step_here<S: Simd, const N: usize>(
+        &self,
+        simd: S,
+        cell: &Cell,
+        segments: &Segments<S, N>,
+        own: Option<(bool, Floats<S>)>,
+        rule: &Rule,
         room: &mut Room,
     ) -> Taken<S> {
         let (zero, one) = (Floats::splat(simd, 0.0), Floats::splat(simd, 1.0));
@@ -391,19 +330,24 @@ impl Wide {
         if let Some(factor) = &self.factor {
             cell.factors = lines_of(simd, factor, cell.factors, segments.at[1], segments.rise[1], there);
         }
-        let mut left = (there & bend.simd_gt(Floats::splat(simd, MOST_PANELS))).to_bitmask();
+        let (mut left, mut longest) = (0, one);
         if cell.lines[1] - cell.lines[0] > MOST_LINES || cell.factors[1] - cell.factors[0] > MOST_LINES {
             left = there.to_bitmask();
         }
-        if cell.clipped != 0 {
-            self.clip(simd, &cell, segments, room);
+        let breaks = own.is_some_and(|(breaks, _)| breaks);
+        if let Some((_, bend)) = own {
+            left |= (there & bend.simd_gt(Floats::splat(simd, MOST_PANELS))).to_bitmask();
+            longest = one / bend.max(one);
+            if breaks && cell.clipped != 0 {
+                self.clip(simd, &cell, segments, room);
+            }
         }
         if let Some(light) = self.light.as_ref().filter(|_| N == 5) {
-            light.half_ways(simd, segments, room);
+            light.prepare(simd, segments, room);
         }
+        let on_ray = if N == 5 { towards(segments, segments.along) } else { [zero; 2] };
         let absorbing = segments.length * self.absorbing;
         let shining = segments.length * self.shining.unwrap_or(0.0);
-        let longest = one / bend.max(one);
         let mut open = there & !mask32x16::from_bitmask(simd, left);
         let (mut u, mut h, mut end) = (zero, longest, one);
         let (mut red, mut green, mut blue, mut opacity, mut through) = (zero, zero, zero, zero, one);
@@ -420,9 +364,9 @@ impl Wide {
             // No sliver is left to the last.
             h = ends.select(rest, rest.simd_lt(h * 2.0).select(rest * 0.5, h));
             let mut turns = 0;
-            if N == 5 {
+            if N == 5 && own.is_some() {
                 for _ in 0..HALVES {
-                    let far = open & !turn_little(simd, segments, u, h, self.cosine);
+                    let far = open & !turn_little(simd, segments, u, h, self.cosines[0]);
                     turns = far.to_bitmask();
                     if turns == 0 {
                         break;
@@ -431,16 +375,15 @@ impl Wide {
                 }
             }
             let all = h.simd_ge(rest);
-            let held = self.hold(simd, &cell, segments, h.mul_add(Floats::splat(simd, 0.5), u), room);
-            let mut nodes = [Node { color: [zero; 3], tau: zero, most: zero }; 3];
-            for (node, &x) in nodes.iter_mut().zip(&self.rule.nodes) {
-                let place = h.mul_add(Floats::splat(simd, x), u);
-                *node = self.node(simd, &cell, segments, &held, room, place);
+            let held = self.hold(simd, &cell, segments, h.mul_add(Floats::splat(simd, 0.5), u), on_ray, room);
+            let mut nodes = [Node { color: [zero; 3], tau: zero, most: zero }; MOST_NODES];
+            let (scale, mut depths, mut depth) = (absorbing * h, [zero; MOST_NODES], zero);
+            for i in 0..rule.count {
+                let place = h.mul_add(Floats::splat(simd, rule.nodes[i]), u);
+                nodes[i] = self.node(simd, &cell, segments, &held, room, place);
+                depths[i] = nodes[i].tau * scale;
+                depth = depths[i].mul_add(Floats::splat(simd, rule.weights[i]), depth);
             }
-            let scale = absorbing * h;
-            let depths = [nodes[0].tau * scale, nodes[1].tau * scale, nodes[2].tau * scale];
-            let [a, b, _] = self.rule.weights;
-            let depth = (depths[0] + depths[2]).mul_add(Floats::splat(simd, a), depths[1] * b);
             let fits = depth.simd_le(Floats::splat(simd, FAINT));
             let mut tame = fits;
             if turns != 0 {
@@ -454,7 +397,7 @@ impl Wide {
                 opaque = (open & most.simd_gt(Floats::splat(simd, OPAQUE))).to_bitmask();
             }
             let takes = open & tame;
-            let (color, alpha) = self.panel(simd, &nodes, depths, depth, shining * h);
+            let (color, alpha) = self.panel(simd, rule, &nodes, depths, depth, shining * h);
             let seen = takes.select(through, zero);
             red = seen.mul_add(color[0], red);
             green = seen.mul_add(color[1], green);

@@ -126,7 +126,7 @@ impl Wide {
             absorbing: self.absorbing,
             shining: self.shining.unwrap_or(0.0),
             silhouette: self.silhouette.unwrap_or(-1.0),
-            cosine: self.cosine,
+            cosine: self.cosines[0],
             turn: self.turn,
             ..Head::default()
         };
@@ -189,7 +189,7 @@ impl Wide {
     /// The rule of panels.
     fn panels(&self) -> Panels {
         let bends = STEP.map(|step| 1.0 / step / SHARE);
-        let (nodes, weights, to_node) = self.rule.parts();
+        let (nodes, weights, to_node) = self.rules[0].parts();
         Panels { nodes, weights, to_node, bends }
     }
 }

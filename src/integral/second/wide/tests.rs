@@ -109,11 +109,6 @@ fn side_by_side_is_one_by_one() {
             let rows = [Row::<5>::AT, Row::<5>::RISE, Row::<5>::LENGTH, Row::<5>::ALONG];
             let of_two = [Row::<2>::AT, Row::<2>::RISE, Row::<2>::LENGTH, Row::<2>::ALONG];
             let [at, rise, of_length, of_along] = if lit { rows } else { of_two };
-            if lit {
-                room.make::<5>();
-            } else {
-                room.make::<2>();
-            }
             for l in 0..count {
                 for k in 0..if lit { 5 } else { 2 } {
                     room.rows[at + k][37 + l] = ends[0][k][l];

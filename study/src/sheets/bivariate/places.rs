@@ -26,6 +26,10 @@ pub(super) enum As {
 /// Bands between the values that nearly all points have.
 const BANDS: f64 = 6.0;
 
+/// The greatest opacities of Gaussians and of waves.
+const GAUSSIAN: f64 = 0.9;
+const WAVES: f64 = 0.6;
+
 /// Colours of widgets.
 const ORANGE: [f64; 3] = [0.95, 0.6, 0.2];
 const BLUE: [f64; 3] = [0.3, 0.6, 0.95];
@@ -50,15 +54,15 @@ fn shares(mut values: Vec<f64>) -> [f64; 3] {
 }
 
 impl Places {
-    /// Of the field of `job`; and how long its gradients took, in ms.
-    pub(super) fn new(job: &Job) -> Result<(Self, f64)> {
+    /// Of the field of `job`; its gradients, and how long they took, in ms.
+    pub(super) fn new(job: &Job) -> Result<(Self, Gradient, f64)> {
         let points = job.tetrahedra.points(job.mesh.points());
         let start = Instant::now();
         let gradient = Gradient::new(&points, &job.tetrahedra, &job.field)?;
         let taken = ms(start);
         let lengths = gradient.vectors().iter().map(|v| v.length()).collect();
         let (s, unit) = (shares(job.field.values().into_owned()), job.scene.transfer.unit_distance());
-        Ok((Places { s, g: shares(lengths), unit }, taken))
+        Ok((Places { s, g: shares(lengths), unit }, gradient, taken))
     }
 
     /// How wide the values of most points are: of s and of g.
@@ -83,9 +87,25 @@ impl Places {
     }
 
     pub(super) fn gaussian(&self) -> Result<TransferFunction> {
+        let [center, sigma] = self.center_sigma();
+        self.of(vec![Widget {
+            shape: Shape::Gaussian { center, sigma },
+            color: ORANGE,
+            opacity: GAUSSIAN,
+            domain: OPEN,
+        }])
+    }
+
+    fn center_sigma(&self) -> [[f64; 2]; 2] {
         let [s, g] = self.width();
-        let shape = Shape::Gaussian { center: [self.s[1], self.g[1]], sigma: [0.15 * s, 0.3 * g] };
-        self.of(vec![Widget { shape, color: ORANGE, opacity: 0.9, domain: OPEN }])
+        [[self.s[1], self.g[1]], [0.15 * s, 0.3 * g]]
+    }
+
+    /// What the published equations are of: a Gaussian's centre and σ, where waves along s start, and their period; and the greatest
+    /// extinctions of both, per unit of length.
+    pub(super) fn published(&self) -> ([[f64; 2]; 3], [f64; 2]) {
+        let ([center, sigma], [width, _]) = (self.center_sigma(), self.width());
+        ([center, sigma, [self.s[0], width / BANDS]], [GAUSSIAN / self.unit, WAVES / self.unit])
     }
 
     /// A wave along s, whose g is above the median if `steep`.
@@ -93,7 +113,7 @@ impl Places {
         let [s, _] = self.width();
         let wave = Wave { axis: [1.0, 0.0], start: self.s[0], period: s / BANDS, floor };
         let domain = if steep { [OPEN[0], [self.g[1], f64::INFINITY]] } else { OPEN };
-        self.of(vec![Widget { shape: shape(wave), color: BLUE, opacity: 0.6, domain }])
+        self.of(vec![Widget { shape: shape(wave), color: BLUE, opacity: WAVES, domain }])
     }
 
     /// The functions of their figures.
