@@ -398,7 +398,7 @@ impl Pieces {
     /// Of the segments of a round those whose piece must be taken one by one, a bit each.
     #[inline(always)]
     fn left_of(&self, from: usize, mask: u64) -> u64 {
-        let words = [from / LANES, (from + LANES - 1) / LANES].map(|w| self.left.get(w).copied().unwrap_or(0));
+        let words = [from / LANES, from.div_ceil(LANES)].map(|w| self.left.get(w).copied().unwrap_or(0));
         if words == [0; 2] {
             return 0;
         }
