@@ -31,6 +31,9 @@ struct Second {
     turn: f32,
     /// Bits: see TWO_SIDED and those after it.
     looks: u32,
+    /// The power of silhouettes of whole segments; and the number of equal pieces.
+    whole: f32,
+    pieces: u32,
 }
 
 @group(2) @binding(0) var<uniform> second: Second;
@@ -310,8 +313,9 @@ fn next_break(u: f32, breaks: bool) -> f32 {
     return next;
 }
 
+//#if PANELS
 /// Colour and opacity of the segment in `stretch`; the opacity LEFT where f32 is too coarse for it.
-fn of_stretch() -> vec4f {
+fn of_panels() -> vec4f {
     var bend = 0.0;
     var breaks = false;
     //#if WIDGETS
@@ -436,3 +440,4 @@ fn of_stretch() -> vec4f {
     }
     return vec4f(0.0, 0.0, 0.0, LEFT);
 }
+//#end

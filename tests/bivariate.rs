@@ -8,6 +8,7 @@ use common::{ENGINES, Engine, Report, Scene, on_device, set};
 use glam::DVec3;
 use halite::field::{Association, Component, Field};
 use halite::gpu::DeviceChoice;
+use halite::integral::options::{IntegrationOptions, Method, Silhouettes, Two};
 use halite::mesh::cells::Tetrahedra;
 use halite::mesh::{Array, Mesh, Values, generate};
 use halite::reference::Reference;
@@ -384,4 +385,51 @@ fn devices_draw_the_pictures_of_the_walk() {
         }
     }
     report.finish("two variables on devices");
+}
+
+/// Segments in equal pieces, and silhouettes of whole ones, are those of the walk on the CPU on devices, too.
+#[test]
+fn devices_draw_what_was_published() {
+    let mut report = Report::default();
+    let view = view(32);
+    let of = |two: Two| IntegrationOptions::default().with_two(two);
+    let (method, silhouettes) = (Method::Segmented, Silhouettes::Published);
+    let forms = [
+        ("pieces", of(Two::default().with_method(method).with_pieces(7))),
+        ("whole", of(Two::default().with_silhouettes(silhouettes))),
+        ("pieces and whole", of(Two::default().with_method(method).with_silhouettes(silhouettes))),
+    ];
+    for engine in DEVICES {
+        let Some(mut renderer) = on_device(*engine) else { return };
+        let mut walk = Renderer::with_engine(2, DeviceChoice::Cpu, render::Engine::Traverse).unwrap();
+        for (name, transfer) in functions() {
+            let has_silhouette = transfer.shading().is_some_and(|s| s.silhouette().is_some());
+            let scene = scene(&generate::demo(3), transfer, false);
+            set(&mut renderer, &scene);
+            set(&mut walk, &scene);
+            let mut adaptive = None;
+            for (form, integral) in &forms {
+                if form.ends_with("whole") && !has_silhouette {
+                    continue;
+                }
+                renderer.set_integral(*integral);
+                walk.set_integral(*integral);
+                let got = renderer.render(&view, &|_| ()).unwrap();
+                let stats = renderer.stats();
+                let round = ["full raised sine, opacity", "full gaussian, opacity"].contains(&name);
+                assert_eq!(&*stats.device, if round { "cpu" } else { "gpu" }, "{name}, {form}");
+                assert!(stats.cpu_rays <= 2, "{name}, {form}: {} rays are left", stats.cpu_rays);
+                let wanted = walk.render(&view, &|_| ()).unwrap();
+                report.hold(&format!("{name}, {form}, {engine:?}"), &got, &wanted, ON_DEVICES);
+                if has_silhouette {
+                    let other = adaptive.get_or_insert_with(|| {
+                        walk.set_integral(IntegrationOptions::default());
+                        walk.render(&view, &|_| ()).unwrap()
+                    });
+                    assert!(other.compare(&wanted).unwrap().max > 1e-4, "{name}, {form} is another picture");
+                }
+            }
+        }
+    }
+    report.finish("published forms on devices");
 }

@@ -12,6 +12,7 @@ use wgpu::BufferUsages as Usage;
 
 const SECOND: &str = include_str!("../../shaders/second.wgsl");
 const SOURCES: &str = include_str!("../../shaders/second_sources.wgsl");
+const PIECES: &str = include_str!("../../shaders/second_pieces.wgsl");
 const LIGHT: &str = include_str!("../../shaders/second_light.wgsl");
 
 /// The bindings of group 2: `Second` and the rows.
@@ -107,7 +108,7 @@ pub(crate) const ARRAYS: [(&str, &str); 3] = [("values", "Value"), ("shown_cells
 
 /// The names that parts of the shaders ask for.
 pub(crate) fn defined(forms: &Forms) -> Vec<&'static str> {
-    let Forms { source, factor, logarithmic, direct, lit } = *forms;
+    let Forms { source, factor, logarithmic, direct, lit, pieces, whole } = *forms;
     let of = match source {
         Kind::Scalar => "SCALAR",
         Kind::Widgets => "WIDGETS",
@@ -121,6 +122,9 @@ pub(crate) fn defined(forms: &Forms) -> Vec<&'static str> {
         ("LOGS", logarithmic || lit),
         ("KNOTS", factor || source == Kind::Scalar),
         ("ONE_EACH", source != Kind::Widgets),
+        ("PIECES", pieces),
+        ("PANELS", !pieces),
+        ("WHOLE", whole),
         ("CLOSED", source == Kind::Widgets && !(factor || logarithmic || direct || lit)),
     ];
     others.iter().filter(|o| o.1).map(|o| o.0).chain([of]).collect()
@@ -139,6 +143,7 @@ pub(crate) fn program(rows: &Rows) -> String {
     let _ = writeln!(text, "const CLOSED_FORMS = {};", defined.contains(&"CLOSED"));
     text += &shader::with(SECOND, &defined);
     text += &shader::with(SOURCES, &defined);
+    text += &shader::with(PIECES, &defined);
     if forms.lit {
         text += LIGHT;
     }

@@ -4,7 +4,7 @@
 use super::panel::SHARE;
 use super::{Form, Source, Wide};
 use crate::integral::Knots;
-use crate::integral::options::{Method, Silhouettes, Two};
+use crate::integral::options::{Method, Two, Weights};
 use crate::integral::second::Second;
 use crate::integral::second::closed::{Profile, Turn};
 use crate::integral::second::light::{ANGLES, angle, begins};
@@ -34,6 +34,10 @@ pub(crate) struct Forms {
     pub(crate) direct: bool,
     /// Light or silhouettes: gradients are read.
     pub(crate) lit: bool,
+    /// Segments are integrated in equal pieces.
+    pub(crate) pieces: bool,
+    /// Silhouettes are of whole segments.
+    pub(crate) whole: bool,
 }
 
 /// What says colour and opacity.
@@ -68,6 +72,8 @@ pub(crate) struct Head {
     pub(crate) cosine: f32,
     pub(crate) turn: f32,
     pub(crate) looks: u32,
+    pub(crate) whole: f32,
+    pub(crate) pieces: u32,
 }
 
 /// The function.
@@ -97,11 +103,11 @@ pub(crate) fn lacks(transfer: &TransferFunction, two: &Two) -> Option<&'static s
         _ => &[],
     };
     let is_round = |widget: &Widget| matches!(widget.shape, Shape::Gaussian { .. } | Shape::Sinusoid(..));
-    if two.method != Method::Adaptive {
-        return Some("segments in closed form or in equal pieces");
+    if two.method == Method::Analytic {
+        return Some("segments in closed form");
     }
-    if two.silhouettes == Silhouettes::Published && shading.is_some_and(|s| s.silhouette().is_some()) {
-        return Some("silhouettes of whole segments");
+    if two.method == Method::Segmented && two.weights == Weights::Texture {
+        return Some("pieces of segments by a texture");
     }
     if widgets.len() > MOST_WIDGETS {
         return Some("more than 32 widgets");
@@ -128,6 +134,8 @@ impl Wide {
             silhouette: self.silhouette.unwrap_or(-1.0),
             cosine: self.cosines[0],
             turn: self.turn,
+            whole: second.published.unwrap_or(-1.0) as f32,
+            pieces: second.two.pieces,
             ..Head::default()
         };
         let first = |rows: &Vec<[f32; 4]>| rows.len() as u32;
@@ -166,7 +174,9 @@ impl Wide {
             factor: self.factor.is_some(),
             logarithmic: self.is_logarithmic,
             direct: self.shining.is_some(),
-            lit: shading.is_some_and(Shading::needs_normals),
+            lit: shading.is_some_and(Shading::needs_normals) || second.published.is_some(),
+            pieces: second.two.method == Method::Segmented,
+            whole: second.published.is_some(),
         };
         Rows { forms, panels: self.panels(), head, rows }
     }

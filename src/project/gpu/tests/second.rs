@@ -7,10 +7,11 @@ use crate::project::gpu::program::program_of_two;
 
 #[test]
 fn every_program_of_two_variables_is_valid() {
-    for bits in 0..16 {
-        let [factor, logarithmic, direct, lit] = [1, 2, 4, 8].map(|bit| bits & bit != 0);
+    for bits in 0..32 {
+        let [factor, logarithmic, direct, lit, pieces] = [1, 2, 4, 8, 16].map(|bit| bits & bit != 0);
+        let whole = lit && pieces;
         for source in [Source::Scalar, Source::Widgets, Source::Texels] {
-            let forms = Forms { source, factor, logarithmic, direct, lit };
+            let forms = Forms { source, factor, logarithmic, direct, lit, pieces, whole };
             let rows = Rows { forms, panels: Default::default(), head: Default::default(), rows: vec![] };
             for fragments in FORMS.into_iter().filter(|&f| !lit || f == Fragments::Intersected) {
                 let association = ["POINT", "CORNER"][bits & 1];

@@ -20,14 +20,17 @@ fn arrays(forms: &Forms, chunks: usize) -> Vec<ShaderArray> {
 
 #[test]
 fn every_program_of_two_variables_is_valid() {
-    for bits in 0..16 {
-        let [factor, logarithmic, direct, lit] = [1, 2, 4, 8].map(|bit| bits & bit != 0);
+    for bits in 0..64 {
+        let [factor, logarithmic, direct, lit, pieces, whole] = [1, 2, 4, 8, 16, 32].map(|bit| bits & bit != 0);
+        if whole && !lit {
+            continue;
+        }
         for source in [Kind::Scalar, Kind::Widgets, Kind::Texels] {
-            let forms = Forms { source, factor, logarithmic, direct, lit };
+            let forms = Forms { source, factor, logarithmic, direct, lit, pieces, whole };
             for (association, chunks) in [("POINT", 1), ("CORNER", 3), ("CELL", 1)] {
                 validated(&program(association, &rows(forms), &arrays(&forms, chunks)));
             }
-            let closed = source == Kind::Widgets && bits == 0;
+            let closed = source == Kind::Widgets && bits & 15 == 0;
             assert_eq!(defined(&forms).contains(&"CLOSED"), closed);
         }
     }
@@ -35,7 +38,8 @@ fn every_program_of_two_variables_is_valid() {
 
 #[test]
 fn the_layout_of_functions_matches_its_rust_twin() {
-    let forms = Forms { source: Kind::Scalar, factor: true, logarithmic: false, direct: false, lit: true };
+    let (factor, lit, logarithmic, direct, pieces, whole) = (true, true, false, false, false, false);
+    let forms = Forms { source: Kind::Scalar, factor, logarithmic, direct, lit, pieces, whole };
     let module = validated(&program("POINT", &rows(forms), &arrays(&forms, 1)));
     let (_, t) = module.types.iter().find(|(_, t)| t.name.as_deref() == Some("Second")).unwrap();
     let naga::TypeInner::Struct { members, span } = &t.inner else { panic!("it is a struct") };
@@ -44,6 +48,6 @@ fn the_layout_of_functions_matches_its_rust_twin() {
         ($($field:ident)*) => { [$(offset_of!(crate::integral::second::Head, $field)),*] };
     }
     let wanted = offsets!(absorbing shining widgets knots factors texels lights lamps lines size scale offset ambient
-        diffuse specular power silhouette cosine turn looks);
+        diffuse specular power silhouette cosine turn looks whole pieces);
     assert_eq!((*span as usize, &found[..]), (size_of::<crate::integral::second::Head>(), &wanted[..]));
 }
