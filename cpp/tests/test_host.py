@@ -83,7 +83,7 @@ def test_moving_cameras_hand_over_nothing():
 
 
 def test_progress_and_abort():
-    v = volume(lattice(12, field=SLANT), WAVES, RAMP, NumberOfThreads=1)
+    v = volume(lattice(32, field=SLANT), WAVES, RAMP, NumberOfThreads=1)
     shares = []
     v.GetMapper().AddObserver("VolumeMapperRenderProgressEvent", lambda *_: shares.append(1))
     # Large enough that the first report comes long before the end.

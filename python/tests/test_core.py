@@ -270,6 +270,8 @@ def test_other_code_runs_while_it_draws(box, fog):
 
 
 def test_ctrl_c_ends_a_frame_soon(box, fog):
+    # Where the tests run in the background of a shell, Python leaves interrupts ignored.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     renderer = halite.Renderer(box, "s", transfer=fog, engine="traverse", threads=1)
     took = []
     for _ in range(4):
